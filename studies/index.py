@@ -48,8 +48,10 @@ def _kept(file: Path) -> bool:
 
 
 def _counts(goals: Iterable[Mapping[str, Any]]) -> str:
-    found = [goal["verdict"] for goal in goals]
-    return ", ".join(f"{found.count(verdict.value)} {verdict.value}" for verdict in Verdict if verdict.value in found)
+    verdicts = [goal["verdict"] for goal in goals]
+    return ", ".join(
+        f"{verdicts.count(verdict.value)} {verdict.value}" for verdict in Verdict if verdict.value in verdicts
+    )
 
 
 def _totals(judged: Sequence[Sequence[Mapping[str, Any]]], untested: Sequence[Mapping[str, Any]]) -> Iterator[str]:

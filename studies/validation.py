@@ -61,13 +61,13 @@ class Judged(NamedTuple):
 def judged(folder: Path) -> list[Judged]:
     """Return every goal of every summary in a folder of reports, by subject; then those that nothing tests."""
     summaries = _summaries(folder)
-    found = []
+    goals_by_subject = []
     for subject in _subjects(summaries):
         for study in subject.studies:
             goals = summaries.get(study, {"goals": []})["goals"]
-            found += [Judged(subject.question, study, _goal(goal)) for goal in goals]
-        found += [Judged(subject.question, "none", goal) for goal in subject.untested]
-    return found
+            goals_by_subject += [Judged(subject.question, study, _goal(goal)) for goal in goals]
+        goals_by_subject += [Judged(subject.question, "none", goal) for goal in subject.untested]
+    return goals_by_subject
 
 
 def write_validation(folder: Path, output: Path) -> None:
@@ -91,7 +91,7 @@ def write_validation(folder: Path, output: Path) -> None:
             [
                 subject.question,
                 *(
-                    str(_count([item for item in goals if item.subject == subject.question], verdict))
+                    str(_count([goal for goal in goals if goal.subject == subject.question], verdict))
                     for verdict in ORDER
                 ),
                 ", ".join(name for name in subject.studies if name in summaries) or "none with a summary",
@@ -104,12 +104,12 @@ def write_validation(folder: Path, output: Path) -> None:
     document.section("What the studies answer")
     document.items(list(_answers(summaries)))
     for verdict in ORDER:
-        chosen = [item for item in goals if item.goal.verdict is verdict]
+        chosen = [goal for goal in goals if goal.goal.verdict is verdict]
         if chosen:
             document.section(SECTIONS[verdict])
             document.table(
                 ["study", "promised", "measured", "verdict"],
-                [[item.study, item.goal.text, item.goal.reached, verdict.value] for item in chosen],
+                [[goal.study, goal.goal.text, goal.goal.reached, verdict.value] for goal in chosen],
                 f"Goals with the verdict {verdict.value}.",
                 ["left"] * 4,
             )
@@ -136,14 +136,14 @@ def _goal(entry: Mapping[str, str]) -> Goal:
 
 
 def _count(goals: Sequence[Judged], verdict: Verdict) -> int:
-    return sum(item.goal.verdict is verdict for item in goals)
+    return sum(goal.goal.verdict is verdict for goal in goals)
 
 
 def _where(goals: Sequence[Judged]) -> str:
     missed: dict[str, int] = {}
-    for item in goals:
-        if item.goal.verdict is Verdict.FAIL:
-            missed[item.study] = missed.get(item.study, 0) + 1
+    for goal in goals:
+        if goal.goal.verdict is Verdict.FAIL:
+            missed[goal.study] = missed.get(goal.study, 0) + 1
     return (
         "missed by " + ", ".join(f"{name} ({number})" for name, number in missed.items()) if missed else "none missed"
     )

@@ -13,7 +13,7 @@ from studies.common import mission
 from studies.common.ets7 import TIP_SPEED
 from studies.common.flight import flown_along
 from studies.load import paper
-from studies.load.loops import SAFE, Flight, iterate, load_unknown, ship
+from studies.load.loops import SAFE, Flight, iterate, load_unknown, robot_with_load
 
 
 def test_only_one_reading_of_the_printed_inertia_is_a_body():
@@ -37,11 +37,13 @@ def test_what_mujoco_flies_is_what_the_design_computes():
     family = BSplines(mission.start(), range(6), 20.0, 2)
     parameters = 0.05 * np.random.default_rng(1).normal(size=family.size)
     motion = family.motion(parameters)
-    course = flown_along(ship(paper.TRUTH), motion, 20.0)
+    course = flown_along(robot_with_load(paper.TRUTH), motion, 20.0)
     # a tip that is held by joints alone moves with them: the largest speed relative to the base by differences
     assert 0.0 < course.largest("tip_speed") < 2.0 * TIP_SPEED
     assert course.base_rotation[0] == pytest.approx(0.0, abs=1e-7)
-    slower = flown_along(ship(paper.TRUTH), BSplines(mission.start(), range(6), 40.0, 2).motion(parameters), 40.0)
+    slower = flown_along(
+        robot_with_load(paper.TRUTH), BSplines(mission.start(), range(6), 40.0, 2).motion(parameters), 40.0
+    )
     assert slower.largest("tip_speed") == pytest.approx(0.5 * course.largest("tip_speed"), rel=0.01)
     assert slower.largest("base_rotation") == pytest.approx(course.largest("base_rotation"), rel=0.02)
 

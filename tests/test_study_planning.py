@@ -52,7 +52,7 @@ def test_a_plan_hits_with_the_true_ship_and_misses_with_the_published_one():
     right = planner.plan(coordinates_of(prior, robot.link(prior.name).inertial))
     assert miss_of(fly(robot, right)["tip"], planner.target)[0] < 1e-3
     assert miss_of(fly(robot, planner.first)["tip"], planner.target)[0] > 1.0
-    assert miss_of(fly(mission.ship(), planner.first)["tip"], planner.target)[0] < 1e-3
+    assert miss_of(fly(mission.published_robot(), planner.first)["tip"], planner.target)[0] < 1e-3
 
 
 @pytest.mark.usefixtures("slow")
@@ -65,5 +65,5 @@ def test_the_whole_study_small(tmp_path):
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
     assert {goal.verdict for goal in goals(result)[:4]} == {Verdict.OPEN}  # four ships decide nothing
     (row, own), *_ = result.rows.items()
-    wrong = replace(result, rows={row: replace(own, held=np.repeat(np.zeros_like(own.held), 10, axis=0))})
+    wrong = replace(result, rows={row: replace(own, inside=np.repeat(np.zeros_like(own.inside), 10, axis=0))})
     assert goals(wrong)[0].verdict is Verdict.FAIL

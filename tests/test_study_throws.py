@@ -10,7 +10,7 @@ from studies.common.study import Verdict
 from studies.throws import run
 from studies.throws.analysis import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
-from studies.throws.report import STUDY, _quick_fit, goals_of, held_in_all
+from studies.throws.report import STUDY, _quick_fit, covered_in_all, goals_of
 from tests.report_rules import broken_rules
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
@@ -49,8 +49,8 @@ def test_the_rigid_model_is_overconfident_and_the_extended_one_is_not(result):
         plain, extended = result.plain.bodies[body], result.extended.bodies[body]
         assert plain.inflation > 5.0
         assert extended.inflation < 2.0
-        assert plain.held(0.95)[0] < extended.held(0.95)[0]
-    held, total = held_in_all(result, with_truth=True)
+        assert plain.covered(0.95)[0] < extended.covered(0.95)[0]
+    held, total = covered_in_all(result, with_truth=True)
     assert held >= 0.9 * total
 
 

@@ -8,8 +8,8 @@ import pytest
 from bayesid.diagnosis import Status, diagnose
 from studies.throws.data import SMOOTH, Timing, quiet_noise, read_throws, read_truth, regress
 from studies.throws.diagnosis import SPREAD, device_candidates
-from studies.throws.left_over import ORDERS, orders_of
 from studies.throws.model import extended, manoeuvres, rigid
+from studies.throws.residual import ORDERS, orders_of
 from tests.simulated_throws import ACCEL_NOISE, COM, INERTIA, MASS, RATE_NOISE, write_throws
 
 RATES = np.array([[11.0, -9.0, 4.0], [-7.0, 12.0, 8.0], [15.0, 5.0, -9.0], [6.0, -14.0, 7.0]])

@@ -139,7 +139,7 @@ def simulated(model: Model, motions: Sequence[Excitation]) -> list[Manoeuvre]:
     simulator = Posterior.of(model, [planned(model, motion) for motion in motions], step=TRUTH_STEP)
     truth = simulator.unknowns.coordinates([paper.body(paper.TRUTH)])
     recordings = simulate_recordings(simulator, z=truth)
-    return [replace(item, recording=made) for item, made in zip(simulator.manoeuvres, recordings, strict=True)]
+    return [replace(plan, recording=made) for plan, made in zip(simulator.manoeuvres, recordings, strict=True)]
 
 
 def identify_exact(posterior: Posterior) -> NoiseFree:

@@ -210,7 +210,7 @@ def _evidence(document: Document, result: BaseBody) -> None:
 
 
 def _statements(result: BaseBody) -> list[Statement]:
-    reading = next(item for item in result.readings if (item.sigma, item.unit) == (paper.SIGMAS[0], "deg/s"))
+    reading = next(one for one in result.readings if (one.sigma, one.unit) == (paper.SIGMAS[0], "deg/s"))
     well, poor = result.noise_free["well"].worst, result.noise_free["poor"].worst
     loss = result.noise_free["poor"].uncertainty[MOMENTS] / result.noise_free["well"].uncertainty[MOMENTS]
     return [

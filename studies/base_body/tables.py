@@ -101,8 +101,8 @@ def grades(result: BaseBody) -> Iterator[tuple[object, ...]]:
 
 def readings(result: BaseBody) -> Iterator[tuple[object, ...]]:
     """Yield the rows of what every unit would mean that the paper's sigmas may have."""
-    for item in result.readings:
-        yield item.sigma, item.unit, item.fraction, item.mass, item.moment, item.manoeuvres
+    for reading in result.readings:
+        yield reading.sigma, reading.unit, reading.fraction, reading.mass, reading.moment, reading.manoeuvres
 
 
 REACH = 7.0  # half-height of the panel of mass, centre of mass and moments [%]; points beyond are marked at its edge

@@ -74,7 +74,7 @@ def _sum(base: BaseParameters, row: NDArray[np.floating]) -> str:
             if name.endswith(f".{letter}") and value
         ]
         # successive bodies with one coefficient: body less place is the same for all of them
-        for _, alike in groupby(enumerate(terms), key=lambda item: (item[1][0] - item[0], item[1][1])):
+        for _, alike in groupby(enumerate(terms), key=lambda numbered: (numbered[1][0] - numbered[0], numbered[1][1])):
             run_of = [term for _, term in alike]
             first, last, value = run_of[0][0], run_of[-1][0], run_of[0][1]
             one = symbol(f"{bodies[first]}.{letter}", bodies)

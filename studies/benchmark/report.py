@@ -38,35 +38,35 @@ def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
     """Return every figure of merit in each run with its goal."""
 
     def over(value: Callable[[Benchmark], float]) -> Floats:
-        return np.array([value(item) for item in runs])
+        return np.array([value(run) for run in runs])
 
     return [
         *(
             (
                 f"time of {name} over that of one evaluation",
-                np.array([item.speedups[name] for item in runs]),
+                np.array([run.speedups[name] for run in runs]),
                 goal,
                 True,
             )
             for name, goal in RIVALS.items()
         ),
-        ("integration error [σ of a sample]", over(lambda item: item.error), ERROR, False),
-        ("time with 60 links over that with 6", over(lambda item: item.links[60] / item.links[6]), LINKS, False),
+        ("integration error [σ of a sample]", over(lambda run: run.error), ERROR, False),
+        ("time with 60 links over that with 6", over(lambda run: run.links[60] / run.links[6]), LINKS, False),
         (
             "time with noisy joints over that with exact ones",
-            over(lambda item: max(item.whitening.values()) / item.whitening["white"]),
+            over(lambda run: max(run.whitening.values()) / run.whitening["white"]),
             WHITENING,
             False,
         ),
         (
             f"time of an identification to {SAMPLES:.0f} effective samples, compiled [s]",
-            over(lambda item: item.sampling.seconds),
+            over(lambda run: run.sampling.seconds),
             SECONDS,
             False,
         ),
         (
             "evaluations per effective sample, emcee's default move over the package's",
-            over(lambda item: item.sampling.default_cost / item.sampling.cost),
+            over(lambda run: run.sampling.default_cost / run.sampling.cost),
             CHEAPER,
             True,
         ),
@@ -99,8 +99,8 @@ def _varies(values: Floats) -> str:
 def _report(result: Result) -> Report[Result]:
     runs = result.runs
     figures = figures_of_merit(runs)
-    evaluations = np.array([item.evaluation for item in runs])
-    ratios = [np.array([item.speedups[name] for item in runs]) for name in RIVALS]
+    evaluations = np.array([run.evaluation for run in runs])
+    ratios = [np.array([run.speedups[name] for run in runs]) for name in RIVALS]
     rows = [(number, name, value) for name, values, _, _ in figures for number, value in enumerate(values, start=1)]
     return Report(
         title="Benchmark",
@@ -142,26 +142,26 @@ def _simulations(document: Document, result: Result) -> None:
     rows = [
         [
             f"{rival.name} (step {rival.step:g} s, error {format_number(rival.error, 2)} σ)",
-            _spread(np.array([1e6 * item.rivals[k].seconds for item in runs])),
-            _spread(np.array([item.speedups[rival.name] for item in runs])),
+            _spread(np.array([1e6 * run.rivals[k].seconds for run in runs])),
+            _spread(np.array([run.speedups[rival.name] for run in runs])),
         ]
         for k, rival in enumerate(runs[0].rivals)
     ]
     rows.append(
-        ["one evaluation, as in the answer", _spread(np.array([1e6 * item.evaluation for item in runs])), "1 (1 to 1)"]
+        ["one evaluation, as in the answer", _spread(np.array([1e6 * run.evaluation for run in runs])), "1 (1 to 1)"]
     )
     cases: tuple[tuple[str, list[Mapping[Any, float]]], ...] = (
-        ("links", [item.links for item in runs]),
-        ("samples", [item.samples for item in runs]),
-        ("", [item.whitening for item in runs]),
+        ("links", [run.links for run in runs]),
+        ("samples", [run.samples for run in runs]),
+        ("", [run.whitening for run in runs]),
     )
     for title, times in cases:
         first = next(iter(times[0]))
         rows += [
             [
                 format_text(f"{key} {title}".strip()),
-                _spread(np.array([1e6 * found[key] for found in times])),
-                _spread(np.array([found[key] / found[first] for found in times])),
+                _spread(np.array([1e6 * seconds[key] for seconds in times])),
+                _spread(np.array([seconds[key] / seconds[first] for seconds in times])),
             ]
             for key in times[0]
         ]
@@ -179,13 +179,15 @@ def _samples(document: Document, result: Result) -> None:
     runs = result.runs
     document.section("Effective samples")
     rows = []
-    for number, item in enumerate(runs, start=1):
-        found, chains = item.sampling, item.sampling.chains
+    for number, sampling in enumerate([made.sampling for made in runs], start=1):
+        chains = sampling.chains
         rows += [
-            _cost(number, "package's", chains.evaluations, chains.effective_samples, found.seconds),
-            _cost(number, "default", found.default_evaluations, found.default_effective, found.default_seconds),
+            _cost(number, "package's", chains.evaluations, chains.effective_samples, sampling.seconds),
+            _cost(
+                number, "default", sampling.default_evaluations, sampling.default_effective, sampling.default_seconds
+            ),
         ]
-    lengths = min(item.sampling.default_lengths for item in runs)
+    lengths = min(run.sampling.default_lengths for run in runs)
     doubt = "" if lengths >= ENOUGH else ", too few to be sure of it, so that its cost is a lower bound"
     document.table(
         ["run", "moves", "evaluations", "effective samples", "evaluations per sample", "time per sample [ms]"],

@@ -224,19 +224,19 @@ class Sampling(NamedTuple):
         return self.default_evaluations / self.default_effective
 
 
-def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, seed: int) -> Sampling:
+def compare_moves(posterior: Posterior, *, effective: float, default_steps: int, seed: int) -> Sampling:
     """Sample one posterior with the package's moves and with emcee's default stretch move.
 
     Parameters
     ----------
     posterior : Posterior
-    wanted : float; number of effective samples by the package's moves
+    effective : float; number of effective samples by the package's moves
     default_steps : int; number of steps of the default move
     seed : int; seed of the samplers
     """
     identify(posterior, seed, effective_samples=1.0)  # compiles
     began = time.perf_counter()
-    result = identify(posterior, seed, effective_samples=wanted)
+    result = identify(posterior, seed, effective_samples=effective)
     seconds = time.perf_counter() - began
     refined, chains = result.posterior, result.chains
     sampler = emcee.EnsembleSampler(chains.walkers, refined.size, refined.log_density, vectorize=True)
@@ -324,6 +324,6 @@ def _measured(*, full: bool, seed: int) -> Benchmark:
         whitening={name: seconds_per_evaluation(posterior, repeats) for name, posterior in posteriors.items()},
         windows={name: posterior.whitenings[0].window for name, posterior in posteriors.items()},
         sampling=compare_moves(
-            posterior_of(robot, recordings=3), wanted=4000.0, default_steps=12000 if full else 600, seed=seed
+            posterior_of(robot, recordings=3), effective=4000.0, default_steps=12000 if full else 600, seed=seed
         ),
     )

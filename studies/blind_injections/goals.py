@@ -150,14 +150,14 @@ def _stated(text: str, trials: Sequence[Trial]) -> Goal:
 def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence[Trial]) -> Goal:
     """Return the goal on the median correlation of torques, with the exact 95 % interval that order statistics give."""
     text = f"correlation of reconstructed {name} with the true ones: median at least {least:g}"
-    found = np.sort([t.correlation for t in trials if t.case in cases and t.correlation is not None])
-    if not len(found):
+    correlations = np.sort([t.correlation for t in trials if t.case in cases and t.correlation is not None])
+    if not len(correlations):
         return Goal(text, "none", Verdict.NOT_TESTED)
-    median, rank = float(np.median(found)), int(stats.binom.ppf(0.025, len(found), 0.5))
+    median, rank = float(np.median(correlations)), int(stats.binom.ppf(0.025, len(correlations), 0.5))
     if not rank:  # too few for an interval
-        return Goal(text, f"{median:.2f} ({len(found)} trials)", Verdict.OPEN)
-    low, high = float(found[rank - 1]), float(found[-rank])
-    reached = f"{median:.2f} ({low:.2f} to {high:.2f}, {len(found)} trials)"
+        return Goal(text, f"{median:.2f} ({len(correlations)} trials)", Verdict.OPEN)
+    low, high = float(correlations[rank - 1]), float(correlations[-rank])
+    reached = f"{median:.2f} ({low:.2f} to {high:.2f}, {len(correlations)} trials)"
     return Goal(text, reached, Verdict.between(low, high, least))
 
 
@@ -167,10 +167,10 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     text = f"95 % intervals of amplitudes hold the truth: {100.0 * least:g} to {100.0 * most:g} %"
     if len(trials) < 2:
         return Goal(text, "-", Verdict.NOT_TESTED)
-    held = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])
+    covered = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])
     counts = np.array([len(errors) for errors in trials])
-    share = float(held.sum() / counts.sum())
-    error = float(np.sqrt(((held - share * counts) ** 2).sum()) / counts.sum())
+    share = float(covered.sum() / counts.sum())
+    error = float(np.sqrt(((covered - share * counts) ** 2).sum()) / counts.sum())
     reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum()} numbers of {len(counts)} trials)"
     return Goal(text, reached, Verdict.between(share - 2.0 * error, share + 2.0 * error, least, most))
 

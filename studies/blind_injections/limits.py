@@ -70,7 +70,7 @@ def what_is_left(result: Diagnosis, change: Floats) -> float:
 
 def _best(result: Diagnosis) -> Fit:
     """Return the fit of the most probable set of known causes, beside nothing unknown; of the present model if none."""
-    best = next((item for item in result.probabilities.sets if item.causes and item.generic is None), None)
+    best = next((one for one in result.probabilities.sets if one.causes and one.generic is None), None)
     return result.before.fit if best is None or result.alarm.silent else result.fitted(best.causes).fit
 
 
@@ -134,8 +134,8 @@ def simulated_naming(
     count = 0
     for noise in evidence.gram.null_scores(rng, draws):
         drawn = SetEvidence(replace(evidence.gram, score=score + noise), evidence.causes.values())
-        found = enumerate_sets(drawn, prior)
-        count += right(probable_verdict(found, classes_of_equivalents(drawn), silent=False))
+        probabilities = enumerate_sets(drawn, prior)
+        count += right(probable_verdict(probabilities, classes_of_equivalents(drawn), silent=False))
     return count / draws
 
 
@@ -151,23 +151,23 @@ class _Changed:
 
 def _forms(evidence: SetEvidence, causes: Sequence[str]) -> list[Integers]:
     """Return the columns of the causes in each combination of their forms."""
-    found = [np.zeros(0, dtype=int)]
+    combinations = [np.zeros(0, dtype=int)]
     for cause in causes:
         forms = [
             np.concatenate([evidence.gram.groups[group.name] for group in variant.groups])
             for variant in evidence.causes[cause].variants
         ]
-        found = [np.concatenate([before, own]) for before in found for own in forms]
-    return found
+        combinations = [np.concatenate([before, columns]) for before in combinations for columns in forms]
+    return combinations
 
 
 def _nearest(gram: Gram, score: Floats, forms: Sequence[Integers]) -> Floats:
     """Return the score of a change in all columns, the change replaced by what the best form comes closest to."""
-    found, most = np.zeros_like(score), -1.0
+    nearest, most = np.zeros_like(score), -1.0
     for columns in forms:
         directions = independent_directions(gram.matrix[np.ix_(columns, columns)])
         fitted = directions.T @ score[columns]
         if fitted @ fitted > most:
             most = float(fitted @ fitted)
-            found = gram.matrix[:, columns] @ (directions @ fitted)
-    return found
+            nearest = gram.matrix[:, columns] @ (directions @ fitted)
+    return nearest

@@ -201,14 +201,14 @@ def _failures(document: Document, campaign: Campaign) -> None:
 
 def _snaps(trials: Sequence[Trial]) -> list[str]:
     """Return a sentence on how well the torque of snaps is reconstructed beside what their data permit."""
-    found = [
+    snaps = [
         (trial.correlation, trial.signal_to_noise, trial.seed)
         for trial in trials
         if trial.case == "thermal-snap" and trial.correlation is not None and trial.signal_to_noise is not None
     ]
-    if not found:
+    if not snaps:
         return []
-    reached, sizes, seeds = zip(*found, strict=True)
+    reached, sizes, seeds = zip(*snaps, strict=True)
     limits = []
     for size, seed in zip(sizes, seeds, strict=True):
         rng = np.random.default_rng(seed)
@@ -217,7 +217,7 @@ def _snaps(trials: Sequence[Trial]) -> list[str]:
     least = TORQUES["snaps and pulses"][0]
     beyond = f": the goal of {least:g} lies beyond what rates tell" if high < least else ""
     return [
-        f"Of {len(found)} snaps of {min(sizes):.1f} to {max(sizes):.1f} σ the torque reconstructed correlates with the "
+        f"Of {len(snaps)} snaps of {min(sizes):.1f} to {max(sizes):.1f} σ the torque reconstructed correlates with the "
         f"true one by {np.median(reached):.2f} in the median. On rates alone, a reader who knows that each recording "
         "holds one torque that sets in at once and dies away, but neither when, how fast, along which axis nor how "
         f"large, would reach {median:.2f} ({low:.2f} to {high:.2f} in eight of ten draws) at the same sizes, simulated "
@@ -328,7 +328,7 @@ def _cell(value: object) -> object:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, tuple):
-        return "; ".join(item if isinstance(item, str) else " + ".join(item) for item in value)
+        return "; ".join(part if isinstance(part, str) else " + ".join(part) for part in value)
     return value
 
 

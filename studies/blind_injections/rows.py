@@ -66,13 +66,13 @@ def statements(trials: Iterable[Trial]) -> dict[str, list[tuple[float, bool]]]:
     A cause counts where it is stated with more than one per cent, under any name that is accepted for what is hidden;
     the names of one class of equivalents count each by itself.
     """
-    found: dict[str, list[tuple[float, bool]]] = {"causes": [], "unknown": [], "nothing": []}
+    stated: dict[str, list[tuple[float, bool]]] = {"causes": [], "unknown": [], "nothing": []}
     for trial in trials:
         true = set(trial.hidden) | set(trial.accept)
-        found["causes"] += [(value, name in true) for name, value in trial.probabilities.items()]
-        found["unknown"].append((trial.unknown, trial.kind == "unknown"))
-        found["nothing"].append((trial.nothing, trial.kind == "adequate"))
-    return found
+        stated["causes"] += [(value, name in true) for name, value in trial.probabilities.items()]
+        stated["unknown"].append((trial.unknown, trial.kind == "unknown"))
+        stated["nothing"].append((trial.nothing, trial.kind == "adequate"))
+    return stated
 
 
 def scores(trials: Iterable[Trial]) -> list[list[str]]:
@@ -91,7 +91,7 @@ def scores(trials: Iterable[Trial]) -> list[list[str]]:
 
 
 def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
-    right, total = sum(held for _, held in named), len(named)
+    right, total = sum(correct for _, correct in named), len(named)
     interval = stats.binomtest(right, total).proportion_ci(method="wilson")
     stated = float(np.mean([probability for probability, _ in named]))
     ends = f"{interval.low:.3f} to {interval.high:.3f}"
@@ -136,11 +136,11 @@ def errors(trials: Sequence[Trial]) -> list[list[str]]:
 
 
 def _scattered(label: str, values: Sequence[float]) -> list[str]:
-    found: Floats = np.asarray(values, dtype=float)
-    if len(found) == 0:
+    errors: Floats = np.asarray(values, dtype=float)
+    if len(errors) == 0:
         return [label, "0", "–", "–", "–", "–"]
-    inside = [f"{100.0 * (np.abs(found) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
-    return [label, str(len(found)), format_signed(found.mean(), 2), f"{np.sqrt((found**2).mean()):.2f}", *inside]
+    inside = [f"{100.0 * (np.abs(errors) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
+    return [label, str(len(errors)), format_signed(errors.mean(), 2), f"{np.sqrt((errors**2).mean()):.2f}", *inside]
 
 
 @styled
@@ -150,7 +150,7 @@ def reliability_figure(trials: Iterable[Trial]) -> Figure:
     axes = figure.subplots()
     axes.plot([0.0, 1.0], [0.0, 1.0], color=TRUTH, linewidth=0.8)
     for pairs in reliable_pairs(trials).values():
-        stated, right = float(np.mean([pair[0] for pair in pairs])), sum(held for _, held in pairs)
+        stated, right = float(np.mean([pair[0] for pair in pairs])), sum(correct for _, correct in pairs)
         interval = stats.binomtest(right, len(pairs)).proportion_ci(method="wilson")
         axes.plot([stated, stated], [interval.low, interval.high], color=AFTER, linewidth=1.0)
         axes.plot(stated, right / len(pairs), "o", color=AFTER, markersize=4)
@@ -188,7 +188,7 @@ def snap_limit(signal_to_noise: float, rng: np.random.Generator) -> float:
     size = signal_to_noise / np.sqrt(RECORDINGS) / np.linalg.norm(seen)
     true = np.outer(size / DECAY * axis, begin <= TIME) * np.exp(-(TIME - begin) / DECAY)
     variance = ((size / DECAY) * SCALES[:, None]) ** 2
-    found = []
+    estimated = []
     for _ in range(RECORDINGS):
         measured = np.outer(size * axis, seen) + _centred(rng.normal(size=(3, len(TIME))))
         score = measured @ rates.T
@@ -196,8 +196,8 @@ def snap_limit(signal_to_noise: float, rng: np.random.Generator) -> float:
         log_evidence = 0.5 * variance * (score**2).sum(axis=0) / (1.0 + visible) - 1.5 * np.log1p(visible)
         weight = np.exp(log_evidence - log_evidence.max())
         shrunk = (weight / weight.sum() * variance / (1.0 + visible)).sum(axis=0)
-        found.append((score * shrunk) @ torques)
-    return float(np.corrcoef(np.ravel(found), np.ravel([true] * RECORDINGS))[0, 1])
+        estimated.append((score * shrunk) @ torques)
+    return float(np.corrcoef(np.ravel(estimated), np.ravel([true] * RECORDINGS))[0, 1])
 
 
 @cache

@@ -203,14 +203,14 @@ def read(kept: Path) -> list[Trial]:
     return [_trial(line["result"]) for line in read_store(kept) if "probabilities" in line.get("result", {})]
 
 
-def _weighed_trial(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
+def _weighed_trial(plan: Plan, rng: np.random.Generator) -> dict[str, Any]:
     """Make a trial, whose random numbers follow from the seed of its plan.
 
     What was compiled for its robot, recordings and causes stays on disk alone: the memory of a long run would fill.
     """
     keep_compiled()  # trials may run in processes of their own
     try:
-        return asdict(make(item))
+        return asdict(make(plan))
     finally:
         forget_executables()
 
@@ -225,25 +225,25 @@ def _trial(content: Mapping[str, Any]) -> Trial:
     return Trial(**{**content, **tuples, **singles, "probabilities": probabilities, "sets": sets})
 
 
-def make(item: Plan) -> Trial:
+def make(plan: Plan) -> Trial:
     """Make one trial: hide, diagnose and compare."""
-    case = CASES[item.case]
+    case = CASES[plan.case]
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        written = case.write(Path(folder) / "study", item.seed, item.strength)
+        written = case.write(Path(folder) / "study", plan.seed, plan.strength)
         study = Study.load(written.file)
         model = load_model(study)
         knows = all(section.argument_of_latitude is not None for section in study.recordings)
-        result = diagnose(model, load_manoeuvres(study, model.robot), item.seed, knows_latitude=knows)
+        result = diagnose(model, load_manoeuvres(study, model.robot), plan.seed, knows_latitude=knows)
         total = time.perf_counter() - began
-        weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
-        size = _NOT_SEEN if weaker is None else _limits(result, case, item.seed, _signal(result, Study.load(weaker)))
+        weaker = case.make(Path(folder) / "weaker", plan.seed, WEAKER * plan.strength) if _visible(case) else None
+        size = _NOT_SEEN if weaker is None else _limits(result, case, plan.seed, _signal(result, Study.load(weaker)))
     wrench = case if isinstance(case, hidden_causes.Case) and case.frame is not None else None
-    found = result.probabilities
+    probabilities = result.probabilities
     return Trial(
-        case=item.case,
-        seed=item.seed,
-        strength=item.strength,
+        case=plan.case,
+        seed=plan.seed,
+        strength=plan.strength,
         kind=case.status,
         hidden=case.causes,
         accept=case.accept,
@@ -252,14 +252,14 @@ def make(item: Plan) -> Trial:
         sets=_sets(result),
         p_value=result.alarm.p_value,
         probability=result.probability_of(result.verdict.causes) if result.verdict.causes else None,
-        probabilities={c: p for c in found.causes if (p := found.inclusion[c]) > MATTERS},
-        unknown=found.unknown,
-        nothing=found.nothing,
-        amplitude_errors=_amplitude_errors(result, case.amplitudes(item.seed, item.strength)),
+        probabilities={c: p for c in probabilities.causes if (p := probabilities.inclusion[c]) > MATTERS},
+        unknown=probabilities.unknown,
+        nothing=probabilities.nothing,
+        amplitude_errors=_amplitude_errors(result, case.amplitudes(plan.seed, plan.strength)),
         body_errors=_body_errors(result, written),
         frame=None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
         true_frame=None if wrench is None else wrench.frame,
-        correlation=None if wrench is None else _correlation(result, wrench, item, written),
+        correlation=None if wrench is None else _correlation(result, wrench, plan, written),
         seconds={**result.seconds, "total": total},
         **vars(size),
     )
@@ -308,13 +308,13 @@ def _body_errors(result: Diagnosis, written: Written) -> tuple[float, ...]:
     return tuple(((bodies.mean[:10] - written.base.quantities) / bodies.sd[:10]).tolist())
 
 
-def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, written: Written) -> float:
+def _correlation(result: Diagnosis, case: hidden_causes.Case, plan: Plan, written: Written) -> float:
     """Return the correlation of the reconstructed with the true torque, all axes and recordings together."""
     estimated, true = [], []
     for time_, torque, truth in zip(
         result.unexplained.time, result.unexplained.torque[Frame.BASE], written.truths, strict=True
     ):
-        there = case.torque(item.seed, item.strength, truth)
+        there = case.torque(plan.seed, plan.strength, truth)
         true += [np.interp(time_, truth.times, there[:, axis]) for axis in range(3)]
         estimated += list(torque.T)
     return float(np.corrcoef(np.concatenate(estimated), np.concatenate(true))[0, 1])

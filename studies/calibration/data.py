@@ -176,7 +176,7 @@ def record(case: Case, truth: Truth, rng: np.random.Generator) -> Recorded:
     if case is Case.EXACT:
         return Recorded(Manoeuvre(Recording(case, None, time, channels), motion, attitude), truth.rates[-1])
     manoeuvre = replace(smoothed(case, time, channels, robot, ENCODER), attitude=attitude)
-    exact, smooth = (item.evaluate(np.zeros(1)) for item in (motion, manoeuvre.motion))
+    exact, smooth = (source.evaluate(np.zeros(1)) for source in (motion, manoeuvre.motion))
     excess = JointState(exact.position, smooth.velocity - exact.velocity, 0.0 * exact.acceleration)
     body = composite(jnp.asarray(composite_rows(robot, kinematics(robot, excess))[0]))
     return Recorded(manoeuvre, truth.rates[-1] - np.asarray(body.inverse @ body.spin))

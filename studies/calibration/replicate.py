@@ -174,7 +174,7 @@ def _chi_squares(posterior: Posterior, z: Floats) -> dict[str, tuple[float, int]
     result = {}
     for kind in posterior.model.channels.kinds:
         columns = posterior.model.channels.of(kind)
-        count = sum(int(item.outputs[:, columns].sum()) for item in posterior.whitenings)
+        count = sum(int(whitening.outputs[:, columns].sum()) for whitening in posterior.whitenings)
         result[kind.value] = (round(float(squares[:, :, columns].sum()), 2), count)
     return result
 
@@ -189,7 +189,7 @@ def plan(full: bool) -> list[Plan]:
     order = [(number / np.sqrt(count), case, number) for case, count in counts.items() for number in range(count)]
     return [
         Plan(case, full and case is not Case.WHOLE and number % EVERY == EVERY // 2)
-        for _, case, number in sorted(order, key=lambda item: item[0])
+        for _, case, number in sorted(order, key=lambda entry: entry[0])
     ]
 
 
@@ -286,13 +286,13 @@ class Replicates:
 def read(store: Path) -> list[Replicates]:
     """Read a store; a case without any replicate is left out."""
     lines = {line["trial"]: line for line in read_store(store)}  # a trial that was repeated counts once
-    found = []
+    replicates = []
     for case in Case:
         mine = [line for line in lines.values() if line["task"]["case"] == case]
         results = [line["result"] for line in mine if "result" in line]
         if mine:
-            found.append(Replicates(case, results, [line["error"] for line in mine if "error" in line]))
-    return found
+            replicates.append(Replicates(case, results, [line["error"] for line in mine if "error" in line]))
+    return replicates
 
 
 ALL = "all cases"  # name of all cases together
@@ -321,17 +321,17 @@ class Coverage:
 
 def interval_coverage(cases: Sequence[Replicates]) -> dict[tuple[str, float], Coverage]:
     """Return the coverage by importance sampling, by the name of a case or `ALL` and by level."""
-    ranks = {str(item.case): item.bodies() for item in cases if len(item.results) > 1}
-    found = {
+    ranks = {str(runs.case): runs.bodies() for runs in cases if len(runs.results) > 1}
+    coverages = {
         (name, level): Coverage(level, *coverage(values, level)) for name, values in ranks.items() for level in LEVELS
     }
     if ranks:
         together = list(ranks.values())
-        found |= {(ALL, level): Coverage(level, *pooled_coverage(together, level)) for level in LEVELS}
-    return found
+        coverages |= {(ALL, level): Coverage(level, *pooled_coverage(together, level)) for level in LEVELS}
+    return coverages
 
 
 def pooled_coverage(ranks: Sequence[Floats], level: float) -> tuple[float, float]:
     """Return the coverage of replicates of several cases, each replicate with the same weight, and its error."""
-    shares = np.concatenate([(np.abs(2.0 * item - 1.0) < level).mean(axis=1) for item in ranks])
+    shares = np.concatenate([(np.abs(2.0 * of_case - 1.0) < level).mean(axis=1) for of_case in ranks])
     return float(shares.mean()), float(shares.std() / np.sqrt(len(shares)))

@@ -45,7 +45,7 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
     corrected = corrected_p_values(cases)
     goals = []
     for case, planned in REPLICATES.items():
-        mine = next((item for item in cases if item.case is case), None)
+        mine = next((runs for runs in cases if runs.case is case), None)
         made = 0 if mine is None else len(mine.results)
         text = f"ranks uniform, {planned:,} replicates: {case}"
         if mine is None or made == 0:
@@ -60,23 +60,23 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
 
 def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     """Return the goal on the coverage of the intervals of each level, in every case and in all together."""
-    found = replicate.interval_coverage(cases)
-    corrected = replicate.holm({key: item.p_value for key, item in found.items()})
+    coverages = replicate.interval_coverage(cases)
+    corrected = replicate.holm({key: coverage.p_value for key, coverage in coverages.items()})
     complete = all(
-        any(item.case is case and len(item.results) >= planned for item in cases)
+        any(runs.case is case and len(runs.results) >= planned for runs in cases)
         for case, planned in REPLICATES.items()
     )
     goals = []
     for level in LEVELS:
         text = f"{format_percent(level)} intervals hold that share of truths in every case"
-        mine = [key for key in found if key[1] == level]
+        mine = [key for key in coverages if key[1] == level]
         if not mine:
             goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
             continue
-        worst = min(mine, key=lambda key: found[key].p_value)
+        worst = min(mine, key=lambda key: coverages[key].p_value)
         verdict = Verdict.FAIL if corrected[worst] <= FAMILYWISE else Verdict.PASS if complete else Verdict.OPEN
-        shown = f"all {found[ALL, level]}; smallest corrected p {format_p_value(corrected[worst])}"
-        goals.append(Goal(text, f"{shown} ({worst[0]}: {found[worst]})", verdict))
+        shown = f"all {coverages[ALL, level]}; smallest corrected p {format_p_value(corrected[worst])}"
+        goals.append(Goal(text, f"{shown} ({worst[0]}: {coverages[worst]})", verdict))
     return goals
 
 
@@ -84,23 +84,23 @@ def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
     """Return the goal on emcee where the arm is unknown, which is judged like the others once it is run there."""
     text = "ranks uniform, emcee: unknown arm and whole system"
     p_values = {
-        (item.case, name): replicate.uniform_p_value(ranks)
-        for item in cases
-        if item.case in ARMS
-        for name, ranks in item.ranks(Method.EMCEE).items()
+        (runs.case, name): replicate.uniform_p_value(ranks)
+        for runs in cases
+        if runs.case in ARMS
+        for name, ranks in runs.ranks(Method.EMCEE).items()
     }
     if not p_values:
         return Goal(text, "none made", Verdict.NOT_TESTED)
     least = min(replicate.holm(p_values).values())
     verdict = Verdict.FAIL if least <= FAMILYWISE else Verdict.OPEN  # so few replicates show gross errors alone
-    made = {item.case: len(item.bodies(Method.EMCEE)) for item in cases if item.case in ARMS}
+    made = {runs.case: len(runs.bodies(Method.EMCEE)) for runs in cases if runs.case in ARMS}
     counts = ", ".join(f"{count or 'none'} of {case}" for case, count in made.items())
     return Goal(text, f"{counts}; smallest corrected p {format_p_value(least)}", verdict)
 
 
 def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], float]:
     """Return Holm's p-values of all unknowns of all cases together."""
-    return replicate.holm({(item.case, name): p for item in cases for name, p in item.p_values.items()})
+    return replicate.holm({(runs.case, name): p for runs in cases for name, p in runs.p_values.items()})
 
 
 def run(
@@ -119,8 +119,8 @@ def run(
 
 def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
     corrected = corrected_p_values(cases)
-    made, planned = sum(len(item.results) for item in cases), sum(REPLICATES.values())
-    share, error = pooled_coverage([item.bodies() for item in cases if item.results], LEVELS[-1])
+    made, planned = sum(len(runs.results) for runs in cases), sum(REPLICATES.values())
+    share, error = pooled_coverage([runs.bodies() for runs in cases if runs.results], LEVELS[-1])
     wrong = [p for p in corrected.values() if p <= FAMILYWISE]
     said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
     return Report(
@@ -154,7 +154,7 @@ def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
 
 
 def _setup(cases: Sequence[Replicates]) -> Setup:
-    seconds = np.median([result["seconds"] for item in cases for result in item.results])
+    seconds = np.median([result["seconds"] for runs in cases for result in runs.results])
     return Setup(
         robot="ETS-VII, alone or with a load, and a planar robot on a table.",
         manoeuvre="Random motion of all joints for 120 s, from a random attitude and initial rate (10⁻³ rad/s).",
@@ -193,7 +193,7 @@ def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
     add_number_table(
         document,
         ["case", "rate", "accelerometer"],
-        [[item.case, *(_mean(item.chi2(sensor)) for sensor in ("rate", "accel"))] for item in cases if item.results],
+        [[runs.case, *(_mean(runs.chi2(sensor)) for sensor in ("rate", "accel"))] for runs in cases if runs.results],
         "Mean chi-square per sample at the truth, with its standard error over replicates. Around one data set, half "
         "of the samples are the same in all replicates, and their mean need not be one.",
     )
@@ -218,7 +218,7 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
         "replicates are few that is weak evidence: see the width of the bands."
     ]
     for title, chosen in (("the package's own data", False), ("data made by MuJoCo", True)):
-        ranks = [item.bodies() for item in cases if (item.case in INDEPENDENT) is chosen and len(item.results)]
+        ranks = [runs.bodies() for runs in cases if (runs.case in INDEPENDENT) is chosen and len(runs.results)]
         if ranks:
             shares = [pooled_coverage(ranks, level) for level in LEVELS]
             words = ", ".join(_percent(*share) for share in shares)
@@ -226,12 +226,12 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
                 f"On {title}, {words} % (with standard errors) of the bodies' true values lie within the "
                 f"{', '.join(f'{100.0 * level:g}' for level in LEVELS)} % intervals."
             )
-    pooled = np.concatenate([item.ranks()[LOG_LIKELIHOOD] for item in cases if item.results])
+    pooled = np.concatenate([runs.ranks()[LOG_LIKELIHOOD] for runs in cases if runs.results])
     p_value = format_p_value(replicate.uniform_p_value(pooled))
     sentences.append(
         f"The log likelihood of all {len(pooled)} replicates together: p = {p_value} of its ranks being uniform."
     )
-    chi2 = [np.concatenate([item.chi2(sensor) for item in cases if item.results]) for sensor in ("rate", "accel")]
+    chi2 = [np.concatenate([runs.chi2(sensor) for runs in cases if runs.results]) for sensor in ("rate", "accel")]
     sentences.append(
         f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, but "
         "not by merit alone: the noise carried from the encoders is overstated where joints move smoothly and "
@@ -251,12 +251,12 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
 
 def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     document.section("What went wrong")
-    errors = [f"{item.case}: {message}" for item in cases for message in item.failures]
-    modes = sum(item.count("converged", False) for item in cases)
-    chains = sum(item.count("emcee_converged", False) for item in cases)
-    sampled = chains + sum(item.count("emcee_converged", True) for item in cases)
-    untrusted = sum(result["pareto_k"] >= TRUSTED for item in cases for result in item.results)
-    shifts = ", ".join(f"{item.rate_shift:.1f} ({item.case})" for item in cases if item.rate_shift > 0.0)
+    errors = [f"{runs.case}: {message}" for runs in cases for message in runs.failures]
+    modes = sum(runs.count("converged", False) for runs in cases)
+    chains = sum(runs.count("emcee_converged", False) for runs in cases)
+    sampled = chains + sum(runs.count("emcee_converged", True) for runs in cases)
+    untrusted = sum(result["pareto_k"] >= TRUSTED for runs in cases for result in runs.results)
+    shifts = ", ".join(f"{runs.rate_shift:.1f} ({runs.case})" for runs in cases if runs.rate_shift > 0.0)
     sentences = [
         f"Replicates that raised an error: {len(errors)}." + "".join(f" {text}." for text in sorted(set(errors))),
         f"Searches for the mode that did not converge: {modes}. Runs of emcee that did not converge: {chains} of "
@@ -264,9 +264,9 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
         "they count like all others.",
     ]
     short = [
-        f"{name} {item} at {format_percent(level)}"
-        for (name, level), item in replicate.interval_coverage(cases).items()
-        if level - item.share > SHORT * item.error
+        f"{name} {coverage} at {format_percent(level)}"
+        for (name, level), coverage in replicate.interval_coverage(cases).items()
+        if level - coverage.share > SHORT * coverage.error
     ]
     if short:
         sentences.insert(
@@ -287,16 +287,16 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
 def _coverage_rows(cases: Sequence[Replicates]) -> list[list[str]]:
     """Return the coverage of each case and of all together, by method."""
     rows = []
-    for item in cases:
-        bad = str(sum(result["pareto_k"] >= TRUSTED for result in item.results))
+    for runs in cases:
+        bad = str(sum(result["pareto_k"] >= TRUSTED for result in runs.results))
         for method in Method:
-            ranks = item.bodies(method)
+            ranks = runs.bodies(method)
             if len(ranks) > 1:
                 cells = [_percent(*replicate.coverage(ranks, level)) for level in LEVELS]
                 doubt = bad if method is Method.IMPORTANCE else "-"
-                rows.append([f"{item.case}: {method}", str(len(ranks)), *cells, doubt])
+                rows.append([f"{runs.case}: {method}", str(len(ranks)), *cells, doubt])
     for method in Method:
-        every = [made for item in cases if len(made := item.bodies(method))]
+        every = [made for runs in cases if len(made := runs.bodies(method))]
         if every:
             cells = [_percent(*pooled_coverage(every, level)) for level in LEVELS]
             rows.append([f"{ALL}: {method}", str(sum(map(len, every))), *cells, "-"])
@@ -321,20 +321,20 @@ def _mean(values: Floats) -> str:
 @styled
 def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
     """Draw the differences of all ranks' distributions from the uniform one, a panel for each case."""
-    shown = [item for item in cases if item.results]
+    shown = [runs for runs in cases if runs.results]
     rows = int(np.ceil(len(shown) / 3))
     figure = wide_figure(0.85 * rows)
     panels = figure.subplots(rows, 3, squeeze=False, sharex=True)
-    for axes, item in zip(panels.ravel(), shown, strict=False):
-        count = len(item.results)
+    for axes, runs in zip(panels.ravel(), shown, strict=False):
+        count = len(runs.results)
         low, high = ecdf_confidence_band(count, POINTS, POINTS, prob=1.0 - FAMILYWISE / family)
         axes.fill_between(POINTS, low - POINTS, high - POINTS, color=COLOURS[0], alpha=0.15, linewidth=0.0)
-        for name, ranks in item.ranks().items():
+        for name, ranks in runs.ranks().items():
             share = np.searchsorted(np.sort(ranks), POINTS, side="right") / count
             special = name == LOG_LIKELIHOOD
             colour, width, order = (COLOURS[1], 1.4, 3) if special else ("0.6", 0.5, 2)
             axes.plot(POINTS, share - POINTS, color=colour, linewidth=width, zorder=order)
-        axes.set_title(f"{item.case} ({count})", fontsize=7)
+        axes.set_title(f"{runs.case} ({count})", fontsize=7)
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[-1]:

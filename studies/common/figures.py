@@ -70,7 +70,7 @@ def manoeuvre_figure(motions: Mapping[str, Motion]) -> Figure:
     figure = wide_figure(4.2)
     panels = figure.subplots(3, len(motions), sharex=True, sharey="row", squeeze=False)
     for column, ((top, middle, bottom), (title, motion)) in enumerate(zip(panels.T, motions.items(), strict=True)):
-        course = flown_along(mission.ship(), motion, mission.DURATION)
+        course = flown_along(mission.published_robot(), motion, mission.DURATION)
         position = motion.evaluate(course.time).position
         for joint in range(6):
             top.plot(

@@ -52,7 +52,7 @@ __all__ = [
     "flight_manoeuvre",
     "fly",
 ]
-__all__ += ["problem", "recorded", "ship", "splines", "start", "true_arm"]
+__all__ += ["problem", "published_robot", "recorded", "splines", "start", "true_arm"]
 
 DURATION = 120.0  # length of every manoeuvre [s]
 POINTS = 8  # number of free control points of every joint's spline
@@ -76,7 +76,7 @@ SENSORS = (
 
 
 @cache
-def ship() -> Robot:
+def published_robot() -> Robot:
     """Return ETS-VII with the ranges of its joints."""
     robot = ets7()
     return replace(robot, joints=tuple(replace(joint, lower=-REACH, upper=REACH) for joint in robot.joints))
@@ -97,7 +97,7 @@ def base_unknown(arm_spread: float = ARM_SPREAD, **options: Any) -> Model:
     **options
         Further arguments of `studies.common.models.base_model`.
     """
-    options = {"robot": ship(), **options}
+    options = {"robot": published_robot(), **options}
     return base_model({SensorKind.RATE: RATE, SensorKind.ACCEL: ACCEL}, arm_spread=arm_spread, **options)
 
 
@@ -144,10 +144,10 @@ def fly(
 ) -> Truth:
     """Fly a manoeuvre in MuJoCo and return what truly happened at the samples; see `studies.common.flight.fly`."""
     times = sample_times(duration, INTERVAL)
-    return flight.fly(ship() if robot is None else robot, motion, times, step=step, **hidden)
+    return flight.fly(published_robot() if robot is None else robot, motion, times, step=step, **hidden)
 
 
 def recorded(truth: Truth, rng: np.random.Generator, name: str = "manoeuvre", bias: Floats | None = None) -> Manoeuvre:
     """Record a flight with fresh noise of sensors and encoders and a bias of the accelerometer, fresh by default."""
     bias = BIAS * rng.standard_normal(3) if bias is None else bias
-    return flight.record(truth._replace(accel=truth.accel + bias), name, ship(), NOISE, rng)
+    return flight.record(truth._replace(accel=truth.accel + bias), name, published_robot(), NOISE, rng)

@@ -90,11 +90,11 @@ def run_trials(
     """
     file = None if store is None else Path(store)
     header = {"function": f"{function.__module__}.{function.__qualname__}", "seed": seed}
-    held = {} if file is None else _resume(file, header, tasks)
-    outcomes = Outcomes([held.get(number) for number in range(len(tasks))])
-    began, done = time.monotonic(), len(held)
+    stored = {} if file is None else _resume(file, header, tasks)
+    outcomes = Outcomes([stored.get(number) for number in range(len(tasks))])
+    began, done = time.monotonic(), len(stored)
     try:
-        left = [number for number in range(len(tasks)) if number not in held]
+        left = [number for number in range(len(tasks)) if number not in stored]
         for count, (number, outcome) in enumerate(_outcomes(function, tasks, left, seed, workers), start=1):
             text = json.dumps({"trial": number, "task": tasks[number], **outcome}, default=_plain)
             if file is not None:
@@ -104,7 +104,7 @@ def run_trials(
             outcomes.results[number] = outcome.get("result")
             if "error" in outcome:
                 outcomes.failures[number] = outcome["error"]
-            done = len(held) + count
+            done = len(stored) + count
             pace = (time.monotonic() - began) / count
             failed = f", {len(outcomes.failures)} failed" if outcomes.failures else ""
             progress(
@@ -135,7 +135,7 @@ def _outcomes(
         for number in left:
             yield number, _attempt(function, tasks[number], seed, number)
         return
-    own = isinstance(workers, int)
+    starts_pool = isinstance(workers, int)
     pool = _processes(workers) if isinstance(workers, int) else workers
     futures = {pool.submit(_attempt, function, tasks[number], seed, number): number for number in left}
     try:
@@ -144,7 +144,7 @@ def _outcomes(
     finally:
         for future in futures:
             future.cancel()
-        if own:
+        if starts_pool:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -183,17 +183,17 @@ def _resume(file: Path, header: dict[str, Any], tasks: Sequence[Any]) -> dict[in
         return {}
     if lines[0] != header:
         raise ValueError(f"{file} holds trials of {lines[0]}, not of {header}; give another file")
-    held = {}
+    stored = {}
     for line in lines[1:]:
         number = line["trial"]
         if number < len(tasks) and line["task"] != json.loads(json.dumps(tasks[number], default=_plain)):
             other = f"{line['task']} in place of {tasks[number]}"
             raise ValueError(f"{file} holds trial {number} of another plan, {other}; give another file")
         if number < len(tasks) and "result" in line:
-            held[number] = line["result"]
+            stored[number] = line["result"]
     # what was cut off must not run into the next line
     os.truncate(file, file.read_bytes().rfind(b"\n") + 1)
-    return held
+    return stored
 
 
 def _lines(file: Path) -> list[dict[str, Any]]:

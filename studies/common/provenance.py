@@ -54,8 +54,8 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
 def commit() -> str:
     """Return the commit of the code that runs, marked where package or studies differ from it."""
     try:
-        found = _git("rev-parse", "--short=12", "HEAD")
-        return f"{found} with changes" if _git("status", "--porcelain", "--", "bayesid", "studies") else found
+        revision = _git("rev-parse", "--short=12", "HEAD")
+        return f"{revision} with changes" if _git("status", "--porcelain", "--", "bayesid", "studies") else revision
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
 

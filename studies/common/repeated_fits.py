@@ -159,7 +159,7 @@ def repeat(
 def estimate(task: _Task, rng: np.random.Generator) -> dict[str, Any]:
     """Fly once, fit, and return the error of the base's quantities and the last step of the fit."""
     shared = _reference(task.parameters, task.points, task.arm_spread)
-    robot = mission.true_arm(mission.ship(), rng, task.arm_spread)
+    robot = mission.true_arm(mission.published_robot(), rng, task.arm_spread)
     motion = mission.splines(task.points).motion(np.array(task.parameters))
     posterior = shared.given(mission.recorded(mission.fly(motion, robot), rng))
     z, step = np.zeros(posterior.size), np.zeros(posterior.size)
@@ -168,5 +168,5 @@ def estimate(task: _Task, rng: np.random.Generator) -> dict[str, Any]:
         z = z - step
     truth = mass_com_inertia(robot.link(BASE).inertial.vector)
     sd = np.linalg.norm(shared.inverse, axis=1)
-    found = mass_com_inertia(posterior.unknowns.inertials(z)[0].vector)
-    return {"error": found - truth, "last_step": float(np.abs(step / sd).max())}
+    estimated = mass_com_inertia(posterior.unknowns.inertials(z)[0].vector)
+    return {"error": estimated - truth, "last_step": float(np.abs(step / sd).max())}

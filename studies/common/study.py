@@ -183,7 +183,7 @@ class Report(Generic[R]):
             section(document, result)
         if self.statements:
             document.section("What the paper states, and what is found here")
-            rows = [[item.text, item.finding.value, item.reason] for item in self.statements]
+            rows = [[statement.text, statement.finding.value, statement.reason] for statement in self.statements]
             document.table(["the paper", "finding", "why"], rows, "Statements of the paper.", ["left"] * 3)
         files = [table.write(output) for table in self.tables]
         if files and self.beside:

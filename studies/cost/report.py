@@ -31,16 +31,16 @@ def goals_of(cost: Cost) -> list[Goal]:
     """Return every goal with what was reached."""
     goals = []
     for kind, limits in (("with compiled code kept", "warm"), ("cold", "cold")):
-        for limit in sorted({getattr(item, limits) for item in DIAGNOSES}):
-            timed = [item for item in DIAGNOSES if item.title in cost.diagnoses]
-            names = [item.title for item in timed if getattr(item, limits) == limit]
+        for limit in sorted({getattr(case, limits) for case in DIAGNOSES}):
+            timed = [case for case in DIAGNOSES if case.title in cost.diagnoses]
+            names = [case.title for case in timed if getattr(case, limits) == limit]
             if names:
                 goals.append(_times(cost, names, kind, limit))
-    memory = {name: max(item.memory for item in runs) for name, runs in cost.diagnoses.items()}
+    memory = {name: max(run.memory for run in runs) for name, runs in cost.diagnoses.items()}
     worst = max(memory, key=lambda name: memory[name])
     reached = f"{format_number(memory[worst], 3)} GB ({worst})"
     goals.append(Goal(f"Memory of a diagnosis: at most {MEMORY:g} GB", reached, Verdict.of(memory[worst] <= MEMORY)))
-    sampled = {name: item.phases["sample"] for name, item in cost.sampled.items()}
+    sampled = {name: run.phases["sample"] for name, run in cost.sampled.items()}
     goals.append(
         Goal(
             f"4,000 effective samples of the extended model of a single cause within {SAMPLES:g} s more",
@@ -51,7 +51,7 @@ def goals_of(cost: Cost) -> list[Goal]:
     goals.append(_nested(cost))
     for name, limit in COMMANDS.items():
         if limit is not None and name in cost.commands:
-            walls = [item.wall for item in cost.commands[name][1:]]
+            walls = [run.wall for run in cost.commands[name][1:]]
             text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"
             goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
     return goals + _search_goals(cost.search)
@@ -76,10 +76,10 @@ def _search_goals(search: SearchTimes | None) -> list[Goal]:
 
 def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
     part = slice(0, 1) if kind == "cold" else slice(1, None)
-    each = {name: [item.to_verdict for item in cost.diagnoses[name][part]] for name in names}
+    each = {name: [run.to_verdict for run in cost.diagnoses[name][part]] for name in names}
     said = ", ".join(f"{name} {_spread(values)}" for name, values in each.items())
     verdicts = [Verdict.between(min(values), max(values), most=limit) for values in each.values()]
-    worst = next((item for item in (Verdict.FAIL, Verdict.OPEN) if item in verdicts), Verdict.PASS)
+    worst = next((verdict for verdict in (Verdict.FAIL, Verdict.OPEN) if verdict in verdicts), Verdict.PASS)
     return Goal(f"Files to verdict, {kind}: at most {limit:g} s for {', '.join(names)}", said, worst)
 
 
@@ -106,7 +106,7 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _report(cost: Cost) -> Report[Cost]:
-    warm = {name: middle(runs, lambda item: item.to_verdict) for name, runs in cost.diagnoses.items()}
+    warm = {name: middle(runs, lambda run: run.to_verdict) for name, runs in cost.diagnoses.items()}
     quickest, slowest = min(warm, key=lambda name: warm[name]), max(warm, key=lambda name: warm[name])
     goals = goals_of(cost)
     return Report(
@@ -115,7 +115,7 @@ def _report(cost: Cost) -> Report[Cost]:
         question="How long do commands take from files to answers, with compiled code kept and without, how much "
         "memory, and how does that grow with the problem?",
         answer=f"A diagnosis of three recordings comes to its verdict in {warm[quickest]:.1f} s ({quickest}) to "
-        f"{warm[slowest]:.1f} s ({slowest}) with compiled code kept, with the whole catalogue{_wanted(warm)}; "
+        f"{warm[slowest]:.1f} s ({slowest}) with compiled code kept, with the whole catalogue{_limits_text(warm)}; "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
         goals=goals,
         valid=f"run on {processor()}, two cores, with nothing beside it. The machine's speed varies by a third from "
@@ -143,20 +143,20 @@ def _report(cost: Cost) -> Report[Cost]:
 def _runs(cost: Cost) -> CsvTable:
     names = ["start", "load", "compile", "fit", "verdict", *AFTER_VERDICT]
     rows = [
-        [kind, name, number, "cold" if number == 0 else "warm", item.wall, item.processor, item.memory]
-        + [item.phases.get(phase, "") for phase in names]
+        [kind, name, number, "cold" if number == 0 else "warm", run.wall, run.processor, run.memory]
+        + [run.phases.get(phase, "") for phase in names]
         for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands))
         for name, runs in group.items()
-        for number, item in enumerate(runs)
+        for number, run in enumerate(runs)
     ]
     return CsvTable("runs", ["kind", "what", "run", "code", "wall", "processor", "memory", *names], rows)
 
 
-def _wanted(warm: Mapping[str, float]) -> str:
+def _limits_text(warm: Mapping[str, float]) -> str:
     """Return the wanted times to the verdict beside those that were reached, for a sentence."""
     parts = []
-    for limit in sorted({item.warm for item in DIAGNOSES if item.title in warm}):
-        times = {item.title: warm[item.title] for item in DIAGNOSES if item.title in warm and item.warm == limit}
+    for limit in sorted({case.warm for case in DIAGNOSES if case.title in warm}):
+        times = {case.title: warm[case.title] for case in DIAGNOSES if case.title in warm and case.warm == limit}
         late = sum(value > limit for value in times.values())
         parts.append(f"{limit:g} s ({joined(times)}), missed by {late} of {len(times)}")
     return f"; wanted are {joined(parts)}" if parts else ""
@@ -168,10 +168,8 @@ def _phases(document: Document, cost: Cost) -> None:
     rows = []
     for name, runs in cost.diagnoses.items():
         parts = (runs[:1], runs[1:])
-        cells = [
-            [float(np.median([item.phases.get(phase, 0.0) for item in part])) for part in parts] for phase in phases
-        ]
-        memory = max(item.memory for item in runs)
+        cells = [[float(np.median([run.phases.get(phase, 0.0) for run in part])) for part in parts] for phase in phases]
+        memory = max(run.memory for run in runs)
         rows.append([name, *(f"{cold:.1f} / {warm:.1f}" for cold, warm in cells), f"{memory:.2f}"])
     document.table(
         ["diagnosis of", *phases, "memory [GB]"],
@@ -210,7 +208,7 @@ def _compared(document: Document, cost: Cost) -> None:
             earlier = [float(line["wall"]) for line in lines if (line["kind"], line["what"]) == (kind, name)]
             if not earlier:
                 continue
-            was, now = float(np.median(earlier)), middle(runs, lambda item: item.wall)
+            was, now = float(np.median(earlier)), middle(runs, lambda run: run.wall)
             if abs(now / was - 1.0) > CHANGED:
                 change = f"{100.0 * (now / was - 1.0):+.0f}".replace("-", "−")
                 rows.append([f"diagnose ({name})" if kind == "diagnose" else name, f"{was:.1f}", f"{now:.1f}", change])
@@ -263,8 +261,8 @@ def phases_figure(cost: Cost) -> Figure:
 
     for number, runs in enumerate(cost.diagnoses.values()):
         for shift, part in ((-0.2, runs[:1]), (0.2, runs[1:])):
-            verdict = float(np.median([item.to_verdict for item in part]))
-            whole = float(np.median([item.wall for item in part]))
+            verdict = float(np.median([run.to_verdict for run in part]))
+            whole = float(np.median([run.wall for run in part]))
             axes.bar(number + shift, verdict, 0.36, color=BEFORE)
             axes.bar(number + shift, whole - verdict, 0.36, bottom=verdict, color=AFTER)
     axes.set_xticks(range(len(cost.diagnoses)), [name.replace(" ", "\n") for name in cost.diagnoses])

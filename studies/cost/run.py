@@ -187,7 +187,7 @@ def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]
         },
         "recordings": {n: seconds(posterior_of(robot, recordings=n)) for n in (1, 2, 4, 8)[:sizes]},
         "links": {n: seconds(posterior_of(chain(n))) for n in (3, 6, 12, 24, 48)[:sizes]},
-        "unknowns": {item.size: seconds(item) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7)[:sizes])},
+        "unknowns": {chosen.size: seconds(chosen) for chosen in (_with_bodies(three, n) for n in (1, 2, 4, 7)[:sizes])},
         "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)[:sizes]},
     }
 
@@ -213,11 +213,11 @@ def verdict_by_candidates(model: Model, manoeuvres: list[Manoeuvre], counts: tup
     The code must be compiled: the same recordings have been diagnosed in this process.
     """
     every = candidates(model, longest=float(manoeuvres[0].recording.time[-1]))
-    found = {}
+    seconds = {}
     for count in counts:
         chosen = every[:count] if count < len(every) else every
-        found[len(chosen)] = diagnose(model, manoeuvres, effects=chosen).seconds["verdict"]
-    return found
+        seconds[len(chosen)] = diagnose(model, manoeuvres, effects=chosen).seconds["verdict"]
+    return seconds
 
 
 class Nested(NamedTuple):
@@ -250,7 +250,7 @@ def nested(diagnosis: Diagnosis, limit: float, seed: int) -> Nested | None:
 
 REPEATS = 3  # number of runs with compiled code kept, after the one without
 SAMPLED = ("leak", "payload", "link")  # diagnoses after which the extended model is sampled, by their titles
-TITLES = tuple(item.title for item in DIAGNOSES)  # titles of all diagnoses that are timed
+TITLES = tuple(case.title for case in DIAGNOSES)  # titles of all diagnoses that are timed
 COUNTS = (10, 20, 40, 1000)  # numbers of candidates of the catalogue; the last one takes all
 LIMIT = 600.0  # time at which a nested sampler is stopped [s]
 
@@ -295,24 +295,24 @@ def run(
     repeats = REPEATS if full else 1
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
-        chosen = [item for item in DIAGNOSES if item.title in titles]
-        files = {item.title: write_case(item.case, place / f"study-{k}") for k, item in enumerate(chosen)}
+        chosen = [case for case in DIAGNOSES if case.title in titles]
+        files = {case.title: write_case(case.case, place / f"study-{k}") for k, case in enumerate(chosen)}
 
         def timed(name: str, words: tuple[str, ...], file: Path, count: int, cache: Path) -> list[Run]:
-            found = []
+            runs = []
             for number in range(count):
                 progress(f"{name}, {'cold' if not any(cache.glob('*')) else 'warm'}")
-                found.append(run_command(words, file, place / f"out-{name}-{number}", cache))
-            return found
+                runs.append(run_command(words, file, place / f"out-{name}-{number}", cache))
+            return runs
 
         diagnoses, sampled = {}, {}
-        for item in chosen:
-            cache = place / f"cache-{item.title}"
+        for case in chosen:
+            cache = place / f"cache-{case.title}"
             words = ("diagnose", "--no-sample", "--no-fly-next")
-            diagnoses[item.title] = timed(item.title, words, files[item.title], 1 + repeats, cache)
-            if full and item.title in SAMPLED:
-                runs = timed(f"{item.title}, samples", ("diagnose", "--no-fly-next"), files[item.title], 2, cache)
-                sampled[item.title] = runs[-1]
+            diagnoses[case.title] = timed(case.title, words, files[case.title], 1 + repeats, cache)
+            if full and case.title in SAMPLED:
+                runs = timed(f"{case.title}, samples", ("diagnose", "--no-fly-next"), files[case.title], 2, cache)
+                sampled[case.title] = runs[-1]
         others = {
             name: timed(name, (name,), files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
@@ -323,9 +323,9 @@ def run(
         study = Study.load(files[chosen[-1 if len(chosen) < 2 else 1].title])
         model = load_model(study)
         manoeuvres = load_manoeuvres(study, model.robot)
-        found = diagnose(model, manoeuvres, seed)
+        diagnosis = diagnose(model, manoeuvres, seed)
         by_candidates = verdict_by_candidates(model, manoeuvres, COUNTS if full else COUNTS[-1:])
-        one = nested(found, LIMIT if full else 10.0, seed) if found.verdict.causes else None
+        one = nested(diagnosis, LIMIT if full else 10.0, seed) if diagnosis.verdict.causes else None
     progress("growth of one evaluation")
     grown = growth(20) if full else growth(2, sizes=1)
     floor = floor_of(20 if full else 2)
@@ -334,4 +334,4 @@ def run(
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:
     """Return the median of the runs with compiled code kept."""
-    return float(np.median([value(item) for item in runs[1:]]))
+    return float(np.median([value(run) for run in runs[1:]]))

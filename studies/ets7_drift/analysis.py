@@ -108,7 +108,7 @@ MOST = 3  # largest number of causes of a set that is shown
 class Step:
     """The most probable set of one number of causes, and its fit."""
 
-    found: CauseSet
+    cause_set: CauseSet
     fitted: Hypothesis
 
 
@@ -199,14 +199,14 @@ def _steps(result: Diagnosis) -> tuple[Step, ...]:
     """Return the present model and the most probable set of each number of causes."""
     best: dict[int, CauseSet] = {}
     named = set(result.verdict.causes)
-    for item in result.probabilities.sets:
-        if item.generic is None and (not named or set(item.causes) <= named):
-            best.setdefault(len(item.causes), item)
+    for cause_set in result.probabilities.sets:
+        if cause_set.generic is None and (not named or set(cause_set.causes) <= named):
+            best.setdefault(len(cause_set.causes), cause_set)
     return tuple(Step(best[count], _fitted(result, best[count])) for count in sorted(best) if count <= MOST)
 
 
-def _fitted(result: Diagnosis, item: CauseSet) -> Hypothesis:
-    return result.after if set(item.causes) == set(result.verdict.causes) else result.fitted(item.causes)
+def _fitted(result: Diagnosis, cause_set: CauseSet) -> Hypothesis:
+    return result.after if set(cause_set.causes) == set(result.verdict.causes) else result.fitted(cause_set.causes)
 
 
 def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:

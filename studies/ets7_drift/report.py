@@ -132,7 +132,7 @@ def goals_of(known: str, case: Case | None) -> list[Goal]:
     ends = np.abs(case.distances)
     inside = int((ends <= REACH).sum())
     bodies = case.diagnosis.gain.after.bodies
-    errors = [*(item.distance for item in case.amplitudes), *((bodies.mean - case.world.base) / bodies.sd)]
+    errors = [*(amplitude.distance for amplitude in case.amplitudes), *((bodies.mean - case.world.base) / bodies.sd)]
     far = float(np.abs(errors).max())
     reached = (
         f"{', '.join(named) or 'nothing'}; probability of the three alone {format_probability(_true(case))}",
@@ -147,7 +147,11 @@ def goals_of(known: str, case: Case | None) -> list[Goal]:
 def _true(case: Case) -> float:
     """Return the probability of the three true causes and nothing else."""
     sets = case.diagnosis.probabilities.sets
-    return sum(item.probability for item in sets if item.generic is None and set(item.causes) == set(analysis.CAUSES))
+    return sum(
+        cause_set.probability
+        for cause_set in sets
+        if cause_set.generic is None and set(cause_set.causes) == set(analysis.CAUSES)
+    )
 
 
 def _negatives(document: Document, cases: Cases) -> None:
@@ -182,7 +186,7 @@ def _failures(known: str, case: Case) -> list[str]:
     if verdict.equivalent_to:
         others = "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalent_to.items())
         texts.append(f"Other names of the same change of the model: {others}.")
-    inside = np.mean([np.abs(item.missed) <= REACH * item.sd for item in case.attitudes])
+    inside = np.mean([np.abs(attitude.missed) <= REACH * attitude.sd for attitude in case.attitudes])
     texts.append(
         f"Base known to {known}: over all samples the band holds {format_percent(float(inside), 3)} of the measured "
         "angles, whose errors along one recording are correlated."
@@ -199,20 +203,20 @@ def _evidence(document: Document, cases: Cases) -> None:
         "probability is that of the set alone, and the log evidence is relative to nothing.",
         columns("llrrr"),
     )
-    quantities = [(known, item) for known, case in cases.items() for item in _quantities(case)]
+    quantities = [(known, quantity) for known, case in cases.items() for quantity in _quantities(case)]
     document.table(
         ["base known to", "quantity", "unit", "truth", "estimate ± sd", "error [sd]"],
         [
             [
                 known,
-                item.name,
-                format_unit(item.unit),
-                format_number(item.truth, 4),
-                format_quantity(item.mean, item.sd),
-                format_signed(item.distance),
+                quantity.name,
+                format_unit(quantity.unit),
+                format_number(quantity.truth, 4),
+                format_quantity(quantity.mean, quantity.sd),
+                format_signed(quantity.distance),
             ]
-            for known, item in quantities
-            if not item.name.startswith(("initial rate", "com", "inertia"))
+            for known, quantity in quantities
+            if not quantity.name.startswith(("initial rate", "com", "inertia"))
         ],
         "Mass of the base and momentum of the wheels, fitted together with the other named causes. All ten parameters "
         "and the initial rates, one vector for each recording, are in the table beside this report.",
@@ -251,9 +255,9 @@ def _held_out(case: Case) -> str:
 def _step_row(step: analysis.Step) -> list[str]:
     fit = step.fitted.fit
     return [
-        set_text(step.found.causes),
-        format_probability(step.found.probability),
-        format_signed(step.found.log_evidence) if step.found.causes else "0",
+        set_text(step.cause_set.causes),
+        format_probability(step.cause_set.probability),
+        format_signed(step.cause_set.log_evidence) if step.cause_set.causes else "0",
         format_number(fit.chi2 / fit.posterior.samples),
     ]
 
@@ -261,7 +265,9 @@ def _step_row(step: analysis.Step) -> list[str]:
 def _statements(cases: Cases) -> list[Statement]:
     right = [name for name, case in cases.items() if case.right]
     last = max(
-        float(np.abs(item.plain[-1] - item.measured[-1]).max()) for case in cases.values() for item in case.attitudes
+        float(np.abs(attitude.plain[-1] - attitude.measured[-1]).max())
+        for case in cases.values()
+        for attitude in case.attitudes
     )
     return [
         Statement(

@@ -256,20 +256,20 @@ def run(
     information = information_of(motion)
     table = answers(information["designed"], rates, {label: ACCELS[label] for label in accels}, progress)
     curves = {
-        (name, known): [own.repeated(USUAL, known).worst(count) for count in REPETITIONS]
-        for name, own in information.items()
+        (name, known): [of_manoeuvre.repeated(USUAL, known).worst(count) for count in REPETITIONS]
+        for name, of_manoeuvre in information.items()
         for known in (True, False)
     }
-    after = {name: widths(own) for name, own in information.items()}
+    after = {name: widths(of_manoeuvre) for name, of_manoeuvre in information.items()}
     return Result(motion, table, after, REPETITIONS, curves, _difference(after["designed"], tables), _realised(tables))
 
 
 def _difference(after: Widths, folder: Path) -> float:
     """Return the largest relative difference from the standard deviations in the table of `studies.excitation`."""
     stated = {row["arm"]: row for row in read_rows(folder / "excitation-predicted.csv") if row["manoeuvre"] == DESIGN}
-    found = dict(zip(mission.ROWS, (after.uncertain, after.exact), strict=True))
+    computed = dict(zip(mission.ROWS, (after.uncertain, after.exact), strict=True))
     values = {arm: np.array([float(row[f"sd {heading}"]) for heading in HEADINGS]) for arm, row in stated.items()}
-    return float(max(np.abs(found[arm] / values[arm] - 1.0).max() for arm in mission.ROWS))
+    return float(max(np.abs(computed[arm] / values[arm] - 1.0).max() for arm in mission.ROWS))
 
 
 def _realised(folder: Path) -> tuple[int, float, float]:

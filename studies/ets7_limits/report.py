@@ -219,18 +219,18 @@ def _tables(result: Result) -> list[CsvTable]:
             *labels,
             "exactly" if known else "5 %",
             "known" if bias else "unknown",
-            item.once,
-            item.repetitions,
-            item.floor,
+            answer.once,
+            answer.repetitions,
+            answer.floor,
         ]
         for labels, row in result.answers.items()
-        for (known, bias), item in row.items()
+        for (known, bias), answer in row.items()
     ]
     header = ["rate sensor", "accelerometer [m/s2]", "arm", "bias", "once", "repetitions until 1 %", "lower limit"]
     sds = [
         [name, arm, *map(float, values)]
-        for name, item in result.after.items()
-        for arm, values in zip(mission.ROWS, (item.uncertain, item.exact), strict=True)
+        for name, widths in result.after.items()
+        for arm, values in zip(mission.ROWS, (widths.uncertain, widths.exact), strict=True)
     ]
     return [
         CsvTable("times", header, times),

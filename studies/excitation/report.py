@@ -61,13 +61,13 @@ def goals(result: Result) -> tuple[Goal, ...]:
         text = f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, {row}"
         rows.append(Goal(text, f"{factor:.2f} times", Verdict.of(factor >= WANTED)))
     rows += _search_goals(result)
-    for name, item in result.realised.items():
-        away = np.abs(item.rms - 1.0)
-        low, high = away.max() - 2.0 * item.rms_error, away.max() + 2.0 * item.rms_error
+    for name, realised in result.realised.items():
+        away = np.abs(realised.rms - 1.0)
+        low, high = away.max() - 2.0 * realised.rms_error, away.max() + 2.0 * realised.rms_error
         verdict = Verdict.PASS if high <= WITHIN else Verdict.FAIL if low > WITHIN else Verdict.OPEN
         reached = (
-            f"{item.rms.min():.3f} to {item.rms.max():.3f}, each ± {item.rms_error:.3f}, {len(item.errors)} flights; "
-            f"geometric mean {item.ratio:.3f}"
+            f"{realised.rms.min():.3f} to {realised.rms.max():.3f}, each ± {realised.rms_error:.3f}, "
+            f"{len(realised.errors)} flights; geometric mean {realised.ratio:.3f}"
         )
         text = f"Realised over predicted sd within {format_percent(WITHIN)} of 1 for every parameter: {TITLES[name]}"
         rows.append(Goal(text, reached, verdict))
@@ -78,7 +78,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
             Verdict.of(contest.consistent),
         )
     )
-    kept = all(item.kept for own in contest.designs.values() for item in own.reached)
+    kept = all(limit.kept for design in contest.designs.values() for limit in design.reached)
     finer = "on a grid eight times finer than the search's"
     rows.append(Goal("Every limit kept", finer if kept else f"broken {finer}", Verdict.of(kept)))
     return tuple(rows)
@@ -86,29 +86,31 @@ def goals(result: Result) -> tuple[Goal, ...]:
 
 def _search_goals(result: Result) -> list[Goal]:
     """Return the goals of the searches from many starts."""
-    wanted = f"{STARTS} starts"
+    starts = f"{STARTS} starts"
     largest = (
-        f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
+        f"Largest factor over (26) that {starts} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
         "the best known"
     )
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
-    robots = _robots_goal(wanted, result)
+    robots = _robots_goal(starts, result)
     crowd = result.crowds.get("d-optimal")
     if crowd is None:
-        found = f"{_largest(result.contest)} from {result.search.starts} starts; {wanted} were not run"
-        missing = Goal(near, f"{wanted} were not run", Verdict.NOT_TESTED)
-        return [Goal(largest, found, Verdict.NOT_TESTED), missing, robots]
+        reached = f"{_largest(result.contest)} from {result.search.starts} starts; {starts} were not run"
+        missing = Goal(near, f"{starts} were not run", Verdict.NOT_TESTED)
+        return [Goal(largest, reached, Verdict.NOT_TESTED), missing, robots]
     return [_largest_goal(largest, result, crowd), _near_goal(near, result, crowd), robots]
 
 
-def _robots_goal(wanted: str, result: Result) -> Goal:
+def _robots_goal(starts: str, result: Result) -> Goal:
     """Return whether a thorough search ends as low as the best of many descents, on all robots."""
-    text = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {wanted}, per parameter"
+    text = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {starts}, per parameter"
     crowd = result.crowds.get("d-optimal")
     if crowd is None or result.searches is None or not result.rivals:
         return Goal(text, "not run", Verdict.NOT_TESTED)
     away = {"ETS-VII": float(np.expm1((result.searches.costs - crowd.cost) / PARAMETERS).mean())}
-    away |= {name: float(np.expm1((item.search - item.crowd) / PARAMETERS)) for name, item in result.rivals.items()}
+    away |= {
+        name: float(np.expm1((rivals.search - rivals.crowd) / PARAMETERS)) for name, rivals in result.rivals.items()
+    }
     told = [f"{format_percent(abs(x), 2)} {'worse' if x > 0.0 else 'better'} on {name}" for name, x in away.items()]
     reached = f"{', '.join(told)}; on ETS-VII the mean of {len(result.searches.costs)} searches"
     enough = len(crowd.costs) >= STARTS and len(away) >= ROBOTS
@@ -200,11 +202,11 @@ def _starts(result: Result) -> str:
     """Return from how many random starts the two that are compared were searched, for a sentence."""
     usual = result.search.starts
     crowd = result.crowds.get("d-optimal")
-    own = usual if crowd is None else max(usual, len(crowd.costs))  # those of the usual search are among the crowd
-    own += 0 if result.searches is None else THOROUGH.starts * len(result.searches.costs)
+    starts = usual if crowd is None else max(usual, len(crowd.costs))  # those of the usual search are among the crowd
+    starts += 0 if result.searches is None else THOROUGH.starts * len(result.searches.costs)
     return (
-        f"d-optimality was searched from {own} random starts, the condition number from {usual} and from the best of "
-        "the other criteria"
+        f"d-optimality was searched from {starts} random starts, the condition number from {usual} and from the best "
+        "of the other criteria"
     )
 
 
@@ -218,10 +220,10 @@ def _crowds(result: Result) -> str:
 
 def _flights(result: Result) -> str:
     """Return how many flights were made of which designs."""
-    counts = {len(item.errors) for item in result.realised.values()}
+    counts = {len(realised.errors) for realised in result.realised.values()}
     if len(counts) == 1 and len(result.realised) == len(result.contest.designs):
         return f"{counts.pop()} flights of every design"
-    return ", ".join(f"{len(item.errors)} flights of {TITLES[name]}" for name, item in result.realised.items())
+    return ", ".join(f"{len(realised.errors)} flights of {TITLES[name]}" for name, realised in result.realised.items())
 
 
 def _evidence(document: Document, result: Result) -> None:
@@ -274,10 +276,12 @@ def _evidence(document: Document, result: Result) -> None:
 def _calibration(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     rows = []
-    for name, item in result.realised.items():
-        beyond = [LABELS[k] for k in range(10) if abs(item.rms[k] - 1.0) > WITHIN]
-        step = format_number(float(item.last_step.max()), 2)
-        rows.append([TITLES[name], str(len(item.errors)), format_percent(item.rms_error, 2), ", ".join(beyond), step])
+    for name, realised in result.realised.items():
+        beyond = [LABELS[k] for k in range(10) if abs(realised.rms[k] - 1.0) > WITHIN]
+        step = format_number(float(realised.last_step.max()), 2)
+        rows.append(
+            [TITLES[name], str(len(realised.errors)), format_percent(realised.rms_error, 2), ", ".join(beyond), step]
+        )
     add_number_table(
         document,
         ["manoeuvre", "flights", "error", "beyond", "last step [sd]"],
@@ -410,10 +414,10 @@ def _realised_figure(result: Result) -> Figure:
     axes = figure.subplots()
     axes.axhspan(1.0 - WITHIN, 1.0 + WITHIN, color="#e8e8e8", linewidth=0.0)
     place = np.arange(10)
-    for index, (name, item) in enumerate(result.realised.items()):
+    for index, (name, realised) in enumerate(result.realised.items()):
         moved = place + 0.1 * (index - 0.5 * (len(result.realised) - 1))
         look = {"fmt": "o", "color": COLOURS[index], "markersize": 4, "capsize": 2}
-        axes.errorbar(moved, item.rms, item.rms_error, label=TITLES[name], **look)  # type: ignore[arg-type]
+        axes.errorbar(moved, realised.rms, realised.rms_error, label=TITLES[name], **look)  # type: ignore[arg-type]
     axes.set_xticks(place, LABELS)
     axes.set_ylabel("realised / predicted")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)

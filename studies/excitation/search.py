@@ -87,20 +87,20 @@ class Contest:
 
     def factor(self, name: str, over: str, row: str) -> float:
         """Return how many times smaller one manoeuvre's geometric-mean sd is than that of another."""
-        own = self.predicted[row]
-        return own[over].geometric_mean / own[name].geometric_mean
+        predicted = self.predicted[row]
+        return predicted[over].geometric_mean / predicted[name].geometric_mean
 
     def worst(self, name: str, row: str) -> float:
         """Return the largest relative standard deviation of mass and moments of inertia."""
-        own = self.predicted[row][name]
-        return float((own.sd[JUDGED] / own.mean[JUDGED]).max())
+        predicted = self.predicted[row][name]
+        return float((predicted.sd[JUDGED] / predicted.mean[JUDGED]).max())
 
     @property
     def consistent(self) -> bool:
         """Whether no manoeuvre is better by a criterion than the one that was designed for it."""
         return all(
-            item.costs[name] <= min(other.costs[name] for other in self.designs.values()) + 1e-9
-            for name, item in self.designs.items()
+            design.costs[name] <= min(other.costs[name] for other in self.designs.values()) + 1e-9
+            for name, design in self.designs.items()
             if name != "information-gain"  # an average over draws, which the costs of the others are not
         )
 
@@ -114,15 +114,15 @@ def compete(
     problem: Problem, seed: int, search: Search, first: Sequence[Floats], store: Store, progress: Callable[[str], None]
 ) -> Contest:
     """Design by every criterion of the problem; ``first`` are manoeuvres from which every search begins, too."""
-    found = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=sparse(progress))
-    designs = {item.name: item for item in found}
+    designed = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=sparse(progress))
+    designs = {each.name: each for each in designed}
     motions: dict[str, Motion] = {}
     shrink: dict[str, float] = {}
     sines = paper_problem()
     for name, q in (("printed", paper.EXCITATION), ("poor", POOR)):
         parameters, shrink[name] = shrunk(sines, q)
         motions[name] = sines.plan.family.motion(parameters)
-    motions |= {name: item.motion for name, item in designs.items()}
+    motions |= {name: each.motion for name, each in designs.items()}
     predicted = {}
     for row, spread in mission.ROWS.items():
         progress(f"predictions with the {row}")
@@ -160,7 +160,7 @@ def shrunk(problem: Problem, q: Sequence[float] | Floats) -> tuple[Floats, float
     direction = np.asarray(q) - centre
 
     def kept(factor: float) -> bool:
-        return all(item.kept for item in problem.reached(centre + factor * direction))
+        return all(reached.kept for reached in problem.reached(centre + factor * direction))
 
     if kept(1.0):
         return centre + direction, 1.0
@@ -240,9 +240,9 @@ def crowd_of(
     kept = store.of(f"{name}{search.starts} starts.{criterion.name}")  # their number decides which are followed
     index = problem.criteria.index(criterion)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(index + 1)[index])
-    found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
+    best = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
     descents: Sequence[tuple[Floats, float, int] | None] = [kept.known(f"0.{k}") for k in range(search.starts)]
-    return Crowd(found.parameters, found.cost, np.array([item[1] for item in descents if item is not None]))
+    return Crowd(best.parameters, best.cost, np.array([descent[1] for descent in descents if descent is not None]))
 
 
 class Searches(NamedTuple):
@@ -263,13 +263,13 @@ def searches_of(
     name: str = "",
 ) -> Searches:
     """Search several times, each from random starts of its own; an interrupted study goes on from the store."""
-    found = []
+    optima = []
     for number in range(count):
         kept = store.of(f"{name}search {number}.{criterion.name}")
         rng = np.random.default_rng([seed, number])
-        found.append(optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress))
-    costs = np.array([item.cost for item in found])
-    return Searches(found[int(costs.argmin())].parameters, costs)
+        optima.append(optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress))
+    costs = np.array([optimum.cost for optimum in optima])
+    return Searches(optima[int(costs.argmin())].parameters, costs)
 
 
 # robots by what they are called in the report
@@ -301,15 +301,15 @@ def other_robots(
     seed: int, crowd: Search, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Rivals]:
     """Search on each robot with two efforts, that of the many descents and that of a search; seeds differ."""
-    found = {}
+    rivals = {}
     for name, robot in ROBOTS.items():
         progress(name)
         problem, called = other_problem(robot()), f"{name}: "
         criterion = problem.criteria[0]
         best = crowd_of(problem, criterion, seed, crowd, store, sparse(progress), called)
         searched = searches_of(problem, criterion, seed, 1, search, store, sparse(progress), called)
-        found[name] = Rivals(best.cost, float(searched.costs[0]))
-    return found
+        rivals[name] = Rivals(best.cost, float(searched.costs[0]))
+    return rivals
 
 
 FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)  # effort of each search of a full and of a quick run
@@ -366,7 +366,9 @@ def run(
     problem, crowds, rivals = contest_problem(full, points), {}, {}
     if starts is not None:
         effort = replace(QUICK, starts=starts, executor=executor)
-        crowds = {item.name: crowd_of(problem, item, seed, effort, store, sparse(progress)) for item in CROWDED}
+        crowds = {
+            criterion.name: crowd_of(problem, criterion, seed, effort, store, sparse(progress)) for criterion in CROWDED
+        }
     first, repeated = [crowd.best for crowd in crowds.values()], None
     if searches:
         effort = replace(THOROUGH, executor=executor)
@@ -375,8 +377,8 @@ def run(
         if starts is not None:
             rivals = other_robots(seed, replace(QUICK, starts=starts, executor=executor), effort, store, progress)
     contest = compete(problem, seed, search, first, store, progress)
-    own = contest.designs["d-optimal"].problem
-    cloud = random_cloud(own, random, np.random.default_rng(seed))
+    base = contest.designs["d-optimal"].problem
+    cloud = random_cloud(base, random, np.random.default_rng(seed))
     realised = {}
     for number, name in enumerate(contest.designs):
         if full or name in flown:

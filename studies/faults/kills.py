@@ -91,7 +91,7 @@ def _bayesid(name: str, *options: str) -> Callable[[Path, Path], list[str]]:
     study = "design.toml" if name in ("design", "loop") else "study.toml"
 
     def arguments(folder: Path, output: Path) -> list[str]:
-        where = [str(folder / item) if item.endswith(".py") else item for item in options]
+        where = [str(folder / option) if option.endswith(".py") else option for option in options]
         return ["-m", "bayesid.app.command_line", name, str(folder / study), "--output", str(output), *where]
 
     return arguments
@@ -132,14 +132,14 @@ def kill_and_resume(command: str, folder: Path, rng: np.random.Generator, kills:
     taken = time.monotonic() - began
     if first.returncode:
         raise RuntimeError(f"{command} fails where it is left alone: {first.stderr}")
-    found, broken = 0, []
+    running, broken = 0, []
     for moment in rng.uniform(0.0, taken, size=kills):
-        found += _run_and_kill(COMMANDS[command](folder, killed), float(moment))
+        running += _run_and_kill(COMMANDS[command](folder, killed), float(moment))
         broken += half_written(killed)
     last = _run(COMMANDS[command](folder, killed))
     same = last.returncode == 0 and content_of(killed) == content_of(alone)
     text = (last.stdout + last.stderr).strip().splitlines()
-    return Killed(command, found, tuple(broken), same, text[-1] if text else "")
+    return Killed(command, running, tuple(broken), same, text[-1] if text else "")
 
 
 def content_of(folder: Path) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def _whole(file: Path) -> bool:
 def _without_clocks(content: Any) -> Any:
     if isinstance(content, dict):
         return {key: _without_clocks(value) for key, value in content.items() if key not in DECIDED_BY_CLOCKS}
-    return [_without_clocks(item) for item in content] if isinstance(content, list) else content
+    return [_without_clocks(part) for part in content] if isinstance(content, list) else content
 
 
 def _run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:

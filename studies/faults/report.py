@@ -116,18 +116,18 @@ class Result:
 
     def by(self, key: str) -> dict[str, Made]:
         """Return the tasks of one kind ("unit", "kill", "around") by what they try."""
-        return {item[key]: item for item in self.made if key in item}
+        return {task[key]: task for task in self.made if key in task}
 
     @property
     def spoilt(self) -> list[Made]:
         """Tasks that spoil files."""
-        return [item for item in self.made if "spoil" in item]
+        return [task for task in self.made if "spoil" in task]
 
     @cached_property
     def answers(self) -> dict[str, dict[str, int]]:
         """Numbers of spoilt files by kind of change and outcome."""
         return {
-            kind: {key: sum(item["answers"].get(kind, {}).get(key, 0) for item in self.spoilt) for key in OUTCOMES}
+            kind: {key: sum(task["answers"].get(kind, {}).get(key, 0) for task in self.spoilt) for key in OUTCOMES}
             for kind in KINDS
         }
 
@@ -139,7 +139,7 @@ class Result:
     @property
     def kills(self) -> int:
         """Number of kills that found a command running."""
-        return sum(item["kills"] for item in self.by("kill").values())
+        return sum(task["kills"] for task in self.by("kill").values())
 
 
 def run(
@@ -158,7 +158,7 @@ def run(
         return Result(kept, [line["error"] for line in lines if "error" in line])
     planned = tasks(full)
     outcomes = run_trials(attempt, planned, trials, seed=seed, workers=workers, progress=progress)
-    done = [{**task, **found} for task, found in zip(planned, outcomes.results, strict=True) if found is not None]
+    done = [{**task, **answer} for task, answer in zip(planned, outcomes.results, strict=True) if answer is not None]
     return Result(done, list(outcomes.failures.values()))
 
 
@@ -172,9 +172,9 @@ def _report(result: Result) -> Report[Result]:
         question="What do commands make of spoilt files, mistaken units and kills at random moments?",
         answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, "
         f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
-        f"{sum(item['refused'] for item in units.values())} of {counted(len(units), 'mistaken unit')} "
+        f"{sum(task['refused'] for task in units.values())} of {counted(len(units), 'mistaken unit')} "
         f"{'was' if len(units) == 1 else 'were'} refused; after {counted(result.kills, 'kill')} "
-        f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
+        f"{sum(task['same'] for task in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
         "run left alone.",
         goals=_goals(result),
         valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
@@ -188,10 +188,10 @@ def _report(result: Result) -> Report[Result]:
 
 def _failures(document: Document, result: Result) -> None:
     document.section("What went wrong")
-    wrong = [text for item in result.spoilt for text in item["faults"]]
+    wrong = [text for task in result.spoilt for text in task["faults"]]
     for key in ("unit", "around"):
         wrong += [f"{title}: {i['said'] or 'not refused'}" for title, i in result.by(key).items() if not i["refused"]]
-    wrong += [f"{name} after kills: {item['message']}" for name, item in result.by("kill").items() if not item["same"]]
+    wrong += [f"{name} after kills: {task['message']}" for name, task in result.by("kill").items() if not task["same"]]
     wrong += [f"A trial failed: {text}" for text in result.failures]
     document.items([_short(text) for text in wrong])
     if not wrong:
@@ -206,8 +206,8 @@ def _kills(document: Document, result: Result) -> None:
         "design, loop and campaigns go on from what they kept; diagnose keeps nothing and starts anew."
     )
     rows = [
-        [name, str(item["kills"]), str(len(item["half_written"])), "yes" if item["same"] else "no"]
-        for name, item in result.by("kill").items()
+        [name, str(task["kills"]), str(len(task["half_written"])), "yes" if task["same"] else "no"]
+        for name, task in result.by("kill").items()
     ]
     if rows:
         header = ["command", "kills while it ran", "files half written", "same answer"]
@@ -239,9 +239,9 @@ def _conditions(document: Document, result: Result) -> None:
 def _goals(result: Result) -> list[Goal]:
     numbers, units, around = result.numbers, result.by("unit"), result.by("around")
     total, kills, killed = sum(numbers.values()), result.kills, result.by("kill")
-    broken = [name for item in killed.values() for name in item["half_written"]]
-    refused = sum(item["refused"] for item in units.values())
-    named = sum(item["refused"] and bool(NAMED.search(item["said"])) for item in units.values())
+    broken = [name for task in killed.values() for name in task["half_written"]]
+    refused = sum(task["refused"] for task in units.values())
+    named = sum(task["refused"] and bool(NAMED.search(task["said"])) for task in units.values())
     answers = {name: killed.get(name, {"kills": 0, "same": False}) for name in COMMANDS}
     goals = [
         (
@@ -263,33 +263,33 @@ def _goals(result: Result) -> list[Goal]:
             kills > 0,
         ),
         *(
-            (f"{name}: same answer after kills", counted(item["kills"], "kill"), item["same"], item["kills"] > 0)
-            for name, item in answers.items()
+            (f"{name}: same answer after kills", counted(task["kills"], "kill"), task["same"], task["kills"] > 0)
+            for name, task in answers.items()
         ),
     ]
     return [
         *(Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals),
         *(_refused(title, around.get(title)) for title in SURROUNDINGS),
-        _unmoved(next((item for item in result.made if "cache" in item), None)),
+        _unmoved(next((task for task in result.made if "cache" in task), None)),
     ]
 
 
-def _refused(title: str, item: Made | None) -> Goal:
+def _refused(title: str, task: Made | None) -> Goal:
     text = f"{title}: one clear error"
-    if item is None:
+    if task is None:
         return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)
-    return Goal(text, "refused" if item["refused"] else "not refused", Verdict.of(item["refused"]))
+    return Goal(text, "refused" if task["refused"] else "not refused", Verdict.of(task["refused"]))
 
 
-def _unmoved(item: Made | None) -> Goal:
+def _unmoved(task: Made | None) -> Goal:
     """Return the goal on a cache that another version filled."""
     text = "a cache of another version: no effect"
-    if item is None:
+    if task is None:
         return Goal(text, "not tried; a damaged file of it: tests/test_kept_jit.py", Verdict.NOT_TESTED)
-    if not item["differs"]:
+    if not task["differs"]:
         return Goal(text, "the other version itself gives the same answer", Verdict.NOT_TESTED)
-    same = "same answer as" if item["same"] else "another answer than"
-    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(item["same"]))
+    same = "same answer as" if task["same"] else "another answer than"
+    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(task["same"]))
 
 
 def _short(said: str) -> str:
@@ -304,7 +304,7 @@ def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
     axes = figure.subplots()
     place, left = np.arange(len(answers)), np.zeros(len(answers))
     for (key, title), colour in zip(OUTCOMES.items(), COLOURS[2:5], strict=True):
-        counts = np.array([found.get(key, 0) for found in answers.values()])
+        counts = np.array([of_kind.get(key, 0) for of_kind in answers.values()])
         axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
         left = left + counts
     axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))

@@ -274,8 +274,8 @@ def _key(pattern: str, factor: float) -> Callable[[Path], None]:
         file = folder / "study.toml"
         number = re.compile(r"-?\d+\.?\d*(e-?\d+)?")
 
-        def scaled(found: re.Match[str]) -> str:
-            return found[1] + number.sub(lambda text: repr(float(text[0]) * factor), found[2])
+        def scaled(match: re.Match[str]) -> str:
+            return match[1] + number.sub(lambda text: repr(float(text[0]) * factor), match[2])
 
         file.write_text(re.sub(rf"({pattern} = )(.*)", scaled, file.read_text()))
 

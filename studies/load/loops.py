@@ -45,7 +45,7 @@ from studies.common.quantities import JUDGED, body_of, squared_distances
 from studies.load import paper
 
 __all__ = ["AT_MOST", "GOAL", "LIMITED", "LOAD", "SAFE", "SPREAD", "TRUTH_STEP", "Flight", "Iteration"]
-__all__ += ["excitation", "fly_again", "fly_loop", "iterate", "load_unknown", "ship"]
+__all__ += ["excitation", "fly_again", "fly_loop", "iterate", "load_unknown", "robot_with_load"]
 
 LOAD, LINK = "load", "link6"  # name of the load, and link that carries it
 
@@ -60,9 +60,9 @@ GOAL, AT_MOST = 1e-3, 5  # relative precision to reach, and the largest number o
 TRUTH_STEP = 0.25
 
 
-def ship(load: Floats = paper.GUESS, robot: Robot | None = None) -> Robot:
+def robot_with_load(load: Floats = paper.GUESS, robot: Robot | None = None) -> Robot:
     """Return ETS-VII, by default with the nominal arm, and a load of ten quantities."""
-    return (mission.ship() if robot is None else robot).with_load(Load(LOAD, LINK, body_of(load)))
+    return (mission.published_robot() if robot is None else robot).with_load(Load(LOAD, LINK, body_of(load)))
 
 
 def load_unknown(spread: float, arm_spread: float) -> Model:
@@ -73,7 +73,7 @@ def load_unknown(spread: float, arm_spread: float) -> Model:
     spread, arm_spread : float
         Relative widths of the priors of the load and of the links.
     """
-    robot = ship()
+    robot = robot_with_load()
     links = spread_links(robot, arm_spread, (BASE, LOAD))
     prior = BodyPrior(LOAD, body_of(paper.GUESS), spread)
     return orbiting_model(robot, [prior, *links], SensorBias.of(SensorKind.ACCEL)(BIAS), rate_sigma=RATE_SIGMA)
@@ -96,8 +96,10 @@ class MuJoCoSpacecraft:
     def robot(self) -> Robot:
         """The robot as it truly is."""
         if self.seed is None or self.arm_spread == 0.0:
-            return ship(paper.TRUTH)
-        return ship(paper.TRUTH, mission.true_arm(mission.ship(), np.random.default_rng(self.seed), self.arm_spread))
+            return robot_with_load(paper.TRUTH)
+        return robot_with_load(
+            paper.TRUTH, mission.true_arm(mission.published_robot(), np.random.default_rng(self.seed), self.arm_spread)
+        )
 
     def motion(self, plan: Recording) -> PlannedMotion:
         """Return the motion of the joints that a plan leads to."""
@@ -144,7 +146,7 @@ def iterate(*, seed: int, search: Search) -> list[Iteration]:
     search : Search
         Effort of each design.
     """
-    known = orbiting_model(ship(), [BodyPrior(LOAD, body_of(paper.GUESS), 1.0)], rate_sigma=0.0)
+    known = orbiting_model(robot_with_load(), [BodyPrior(LOAD, body_of(paper.GUESS), 1.0)], rate_sigma=0.0)
     spacecraft, criterion = MuJoCoSpacecraft(step=TRUTH_STEP), Paper26Intended()
     present = mission.problem(known, excitation(), criterion)
     z: Floats = np.zeros(10)

@@ -139,7 +139,7 @@ def _report(result: Result) -> Report[Result]:
             "approximations.",
         ),
         picture=Picture(
-            figures.robot_pose(loops.ship(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
+            figures.robot_pose(loops.robot_with_load(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
             "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; "
             "the loop's own manoeuvres are not drawn.",
         ),
@@ -152,7 +152,7 @@ def _report(result: Result) -> Report[Result]:
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     loop = result.flights["loop"]
-    floor = loops.ship().link("link6").inertial.mass * 0.05
+    floor = loops.robot_with_load().link("link6").inertial.mass * 0.05
     share = format_percent(floor / paper.TRUTH[MASS], 2)
     left = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
@@ -214,7 +214,7 @@ def _evidence(document: Document, result: Result) -> None:
 
 
 def _statements(result: Result) -> list[Statement]:
-    first, second = (item.worst for item in result.iterations)
+    first, second = (iteration.worst for iteration in result.iterations)
     printed = [float(np.abs(paper.errors(values)).max()) for values in paper.RESULTS]
     physical = [reading.physical for reading in paper.readings(paper.TRUTH)]
     return [
@@ -251,7 +251,7 @@ def _tables(result: Result) -> list[CsvTable]:
         for step, row in enumerate(flight.largest)
         for key in row
     ]
-    without = [[number, *map(float, item.estimate)] for number, item in enumerate(result.iterations, start=1)]
+    without = [[number, *map(float, iteration.estimate)] for number, iteration in enumerate(result.iterations, start=1)]
     return [
         CsvTable("steps", ["arm", "manoeuvre", f"{loops.LOAD}'s quantity", "true", "mean", "sd"], steps),
         CsvTable("limits", ["arm", "manoeuvre", "limit", "largest in MuJoCo", "allowed"], limits),
@@ -294,7 +294,7 @@ def _error_figure(iterations: list[Iteration]) -> Figure:
     figure = wide_figure(2.4)
     axes = figure.subplots()
     place = np.arange(len(LABELS))
-    series = {"paper": list(paper.RESULTS), "here, no noise": [item.estimate for item in iterations]}
+    series = {"paper": list(paper.RESULTS), "here, no noise": [iteration.estimate for iteration in iterations]}
     for colour, (name, estimates) in zip((BEFORE, AFTER), series.items(), strict=True):
         for number, estimate in enumerate(estimates):
             error = np.abs(paper.errors(estimate))

@@ -44,7 +44,7 @@ def content() -> dict[str, Any]:
         "sections": list(_sections()),
         "effects": [_effect(entry) for entry in catalogue()],
         "criteria": [{"name": kind.name, "paragraphs": _paragraphs(kind)} for kind in known_criteria().values()],
-        "rooms": list(_rooms(project["tool"]["importlinter"]["contracts"][0]["layers"])),
+        "rooms": list(_packages(project["tool"]["importlinter"]["contracts"][0]["layers"])),
         "names": [{"name": name, "text": _first(getattr(bayesid, name))} for name in sorted(bayesid.__all__)],
         "hooks": [
             {"name": name, "text": _first(value)}
@@ -63,25 +63,25 @@ def _commands() -> Iterator[tuple[str, Any]]:
 
 
 def _command(name: str, made: Any) -> dict[str, Any]:
-    arguments = [item for item in made.params if item.param_type_name == "argument"]
-    options = [item for item in made.params if item.param_type_name == "option"]
-    words = ["bayesid", name, *(_word(item) for item in arguments)]
-    words += [f"{item.opts[0]} {_value(item)}" for item in options if item.required]
+    arguments = [parameter for parameter in made.params if parameter.param_type_name == "argument"]
+    options = [parameter for parameter in made.params if parameter.param_type_name == "option"]
+    words = ["bayesid", name, *(_word(parameter) for parameter in arguments)]
+    words += [f"{parameter.opts[0]} {_value(parameter)}" for parameter in options if parameter.required]
     return {
         "name": name,
         "text": _pieces(made.help),
         "usage": " ".join(words),
         "options": [
-            {"option": _option(item), "text": _pieces(item.help), "default": _default(item.default)}
-            for item in (*arguments, *options)
+            {"option": _option(parameter), "text": _pieces(parameter.help), "default": _default(parameter.default)}
+            for parameter in (*arguments, *options)
         ],
     }
 
 
-def _option(item: Any) -> str:
-    if item.param_type_name == "argument":
-        return _word(item).strip("[]")
-    return " ".join([", ".join([*item.opts, *item.secondary_opts]), _value(item)]).strip()
+def _option(parameter: Any) -> str:
+    if parameter.param_type_name == "argument":
+        return _word(parameter).strip("[]")
+    return " ".join([", ".join([*parameter.opts, *parameter.secondary_opts]), _value(parameter)]).strip()
 
 
 def _word(argument: Any) -> str:
@@ -89,12 +89,12 @@ def _word(argument: Any) -> str:
     return str(word) if argument.required else f"[{word}]"
 
 
-def _value(item: Any) -> str:
-    if item.is_flag:
+def _value(parameter: Any) -> str:
+    if parameter.is_flag:
         return ""
-    kind = item.type_descriptor.annotation
+    kind = parameter.type_descriptor.annotation
     kinds = [kind, *get_args(kind)]
-    return str(item.metavar or next(word for key, word in VALUES.items() if key in kinds))
+    return str(parameter.metavar or next(word for key, word in VALUES.items() if key in kinds))
 
 
 def _default(value: Any) -> str:
@@ -142,16 +142,16 @@ def _type(value: Mapping[str, Any]) -> str:
         if key in value:
             return " or ".join(map(_type, value[key]))
     if "enum" in value:
-        return " or ".join(f'"{item}"' for item in value["enum"])
+        return " or ".join(f'"{entry}"' for entry in value["enum"])
     match value["type"]:
         case "array":
-            item = value["prefixItems"][0] if "prefixItems" in value else value["items"]
-            if any("enum" in one for one in item.get("anyOf", [item])):
+            entry = value["prefixItems"][0] if "prefixItems" in value else value["items"]
+            if any("enum" in one for one in entry.get("anyOf", [entry])):
                 return "list of text"
-            if "$ref" in item:
+            if "$ref" in entry:
                 return "sections"
             size = f"{value['minItems']} " if value.get("minItems") == value.get("maxItems", -1) else ""
-            return f"list of {size}{_plural(item)}"
+            return f"list of {size}{_plural(entry)}"
         case "object":
             inner = value["additionalProperties"]
             return "sections by name" if "$ref" in inner else f"table of {_plural(inner)}"
@@ -185,10 +185,10 @@ def _effect(entry: CatalogueEntry) -> dict[str, Any]:
     }
 
 
-def _rooms(layers: Sequence[str]) -> Iterator[dict[str, Any]]:
+def _packages(layers: Sequence[str]) -> Iterator[dict[str, Any]]:
     for layer in layers:
-        for room in layer.split(" | "):
-            yield {"name": room, "text": _first(importlib.import_module(f"bayesid.{room}"))}
+        for package in layer.split(" | "):
+            yield {"name": package, "text": _first(importlib.import_module(f"bayesid.{package}"))}
 
 
 def _studies() -> Iterator[dict[str, Any]]:

@@ -141,9 +141,9 @@ def _alone(task: Task, seed: int) -> dict[str, Any]:
         settings = {key: task[key] for key in ("count", "duration")}
         return attempt_recipe(Recipe(task["recipe"]), task["hidden"], task["study"], **settings)
     target = target_of(task["unknowns"], **({"duration": task["duration"]} if "duration" in task else {}))
-    wanted = task["effective"]
+    effective = task["effective"]
     if task["sampler"] == REFERENCE:
-        budget = Budget(LONG / EFFECTIVE * wanted, np.inf)
+        budget = Budget(LONG / EFFECTIVE * effective, np.inf)
         return asdict(reference(target, budget, np.random.default_rng(seed)))
-    budget = Budget(wanted, task["limit"])
+    budget = Budget(effective, task["limit"])
     return asdict(SAMPLERS[Sampler(task["sampler"])](target, budget, np.random.default_rng(seed)))

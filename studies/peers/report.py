@@ -74,7 +74,7 @@ def read(store: Path) -> Made:
 def _report(made: Made) -> Report[Made]:
     planned = len(tasks(full=True))
     keys = ("seconds", "evaluations", "gradients", "effective_samples", "log_evidence", "log_evidence_error")
-    density = [item for item in made if "unknowns" in item["task"]]
+    density = [trial for trial in made if "unknowns" in trial["task"]]
     return Report(
         title="Peers",
         subtitle="The package beside what its users would use instead",
@@ -101,8 +101,8 @@ def _report(made: Made) -> Report[Made]:
                     *("log evidence", "error"),
                 ],
                 [
-                    [item["task"]["unknowns"], item["task"]["sampler"], *(item["result"][key] for key in keys)]
-                    for item in density
+                    [trial["task"]["unknowns"], trial["task"]["sampler"], *(trial["result"][key] for key in keys)]
+                    for trial in density
                 ],
             )
         ],
@@ -152,15 +152,15 @@ def goals_of(made: Made) -> list[Goal]:
 
 
 def _speed_goals(made: Made, unknowns: int) -> Iterator[Goal]:
-    own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
+    package, peers = _result_of(made, unknowns, Sampler.OURS), _peers(made, unknowns)
     text = f"{FASTER:g} times less time than the best peer, {unknowns} unknowns"
-    if own is None or not peers:
+    if package is None or not peers:
         yield Goal(text, "not run", Verdict.NOT_TESTED)
         return
     slow = () if unknowns <= NESTED else (Sampler.DYNESTY, Sampler.NAUTILUS)  # not tried with so many unknowns
     missing = [name for name in list(Sampler)[1:] if name not in peers and name not in slow]
-    reached = _fastest(own, peers) + (f"; not run: {' / '.join(missing)}" if missing else "")
-    below = [peer for peer in peers.values() if _needed(peer) / own["seconds"] < FASTER]
+    reached = _fastest(package, peers) + (f"; not run: {' / '.join(missing)}" if missing else "")
+    below = [peer for peer in peers.values() if _needed(peer) / package["seconds"] < FASTER]
     failed = not all(map(_is_bound, below))
     yield Goal(text, reached, Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS)
     beyond = [name for name in slow if name not in peers]
@@ -178,9 +178,9 @@ def _evidence_goal(made: Made, unknowns: int) -> Goal:
     return Goal(text, f"{size:.3f} ± {sd:.3f}", Verdict.between(size - 2.0 * sd, size + 2.0 * sd, most=EVIDENCE))
 
 
-def _fastest(own: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]]) -> str:
+def _fastest(package: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]]) -> str:
     """Return the ratio of the fastest peer with an estimate of its time, and the smallest bound, which limits set."""
-    ratios = {name: _needed(result) / own["seconds"] for name, result in peers.items()}
+    ratios = {name: _needed(result) / package["seconds"] for name, result in peers.items()}
     bounds = [ratio for name, ratio in ratios.items() if _is_bound(peers[name])]
     estimates = {name: ratio for name, ratio in ratios.items() if not _is_bound(peers[name])}
     if not estimates:
@@ -210,10 +210,10 @@ def _answer(made: Made) -> str:
     parts: list[str] = []
     ratios, bounds = {}, []
     for unknowns in sorted(CASES):
-        own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
-        if own is not None and peers:
-            ratios[unknowns] = _fastest(own, peers).partition(" (")[0]
-            bounds += [_needed(peer) / own["seconds"] for peer in peers.values() if _is_bound(peer)]
+        package, peers = _result_of(made, unknowns, Sampler.OURS), _peers(made, unknowns)
+        if package is not None and peers:
+            ratios[unknowns] = _fastest(package, peers).partition(" (")[0]
+            bounds += [_needed(peer) / package["seconds"] for peer in peers.values() if _is_bound(peer)]
     if ratios:
         beside = f", those cut off by the limit of time at least {min(bounds):.1f}" if bounds else ""
         parts.append(
@@ -224,11 +224,11 @@ def _answer(made: Made) -> str:
     known = [abs(error[0]) for error in errors if error is not None]
     if known:
         parts.append(f"its log evidence is within {max(known):.3f} of a long reference")
-    own_errors, rivals = _errors(made, Recipe.BAYESID, True), _rivals(made, True)
-    if len(own_errors) and rivals:
+    errors_of_package, rivals = _errors(made, Recipe.BAYESID, True), _rivals(made, True)
+    if len(errors_of_package) and rivals:
         others = " and ".join(f"{_inside(peer)} of {name}" for name, peer in rivals.items())
         parts.append(
-            f"with wheels hidden {_inside(own_errors)} of its stated 95 % intervals hold the truth, where it is "
+            f"with wheels hidden {_inside(errors_of_package)} of its stated 95 % intervals hold the truth, where it is "
             f"{others}"
         )
     return "; ".join(parts) + "." if parts else "Nothing was run."
@@ -260,9 +260,9 @@ def _failures(document: Document, made: Made) -> None:
     document.section("What went wrong")
     sentences = _slower(made)
     late = [
-        f"{item['task']['sampler']} ({item['task']['unknowns']})"
-        for item in made
-        if "unknowns" in item["task"] and not item["result"]["finished"]
+        f"{trial['task']['sampler']} ({trial['task']['unknowns']})"
+        for trial in made
+        if "unknowns" in trial["task"] and not trial["result"]["finished"]
     ]
     sentences.append(
         f"Stopped at the limit of time: {', '.join(late)}." if late else "No sampler was stopped at the limit of time."
@@ -270,15 +270,15 @@ def _failures(document: Document, made: Made) -> None:
     shifts = [
         (float(np.abs(np.subtract(result["mean"], reference["mean"])).max()), f"{name} ({unknowns})")
         for unknowns in CASES
-        for name, result in {Sampler.OURS: _found(made, unknowns, Sampler.OURS), **_peers(made, unknowns)}.items()
-        if (reference := _found(made, unknowns, REFERENCE)) is not None and result is not None and result["mean"]
+        for name, result in {Sampler.OURS: _result_of(made, unknowns, Sampler.OURS), **_peers(made, unknowns)}.items()
+        if (reference := _result_of(made, unknowns, REFERENCE)) is not None and result is not None and result["mean"]
     ]
     if shifts:
         worst, where = max(shifts)
         sentences.append(
             f"Means of the samples differ from the reference's by at most {worst:.2f} standard deviations ({where})."
         )
-    missing = [task for task in tasks(full=True) if not any(item["task"] == task for item in made)]
+    missing = [task for task in tasks(full=True) if not any(trial["task"] == task for trial in made)]
     if missing:
         kinds = sorted({task.get("sampler") or TITLES[Recipe(task["recipe"])] for task in missing})
         sentences.append(f"Trials of the full study that were not made: {len(missing)} ({', '.join(kinds)}).")
@@ -294,31 +294,36 @@ def _slower(made: Made) -> list[str]:
     """Return sentences on the recipes that take less time than the package's on the same task."""
     sentences = []
     for hidden, words in ((False, "With nothing hidden"), (True, "With wheels hidden")):
-        found = {recipe: _recipes(made, recipe, hidden) for recipe in Recipe}
+        by_recipe = {recipe: _recipes(made, recipe, hidden) for recipe in Recipe}
         times = {
-            recipe: float(np.median([item["seconds"] for item in items])) for recipe, items in found.items() if items
+            recipe: float(np.median([result["seconds"] for result in results]))
+            for recipe, results in by_recipe.items()
+            if results
         }
-        own = times.pop(Recipe.BAYESID, None)
-        faster = [f"{TITLES[recipe]} {time:.1f} s" for recipe, time in times.items() if own and time < own]
+        of_package = times.pop(Recipe.BAYESID, None)
+        faster = [
+            f"{TITLES[recipe]} {time:.1f} s" for recipe, time in times.items() if of_package and time < of_package
+        ]
         if faster:
             sentences.append(
-                f"{words} the package is slower on the same task: it takes {own:.1f} s, {joined(faster)} in the median."
+                f"{words} the package is slower on the same task: it takes {of_package:.1f} s, {joined(faster)} in the "
+                "median."
             )
     return sentences
 
 
 def _rows(made: Made, unknowns: int) -> list[list[str]]:
-    own = _found(made, unknowns, Sampler.OURS)
+    package = _result_of(made, unknowns, Sampler.OURS)
     rows = []
     for name in (*Sampler, REFERENCE):
-        result = _found(made, unknowns, name)
+        result = _result_of(made, unknowns, name)
         if result is None:
             continue
         sampled = f"{result['effective_samples']:,.0f}" if result["effective_samples"] > 0.0 else "-"
         compared = ["-", "-"]
-        if name != REFERENCE and own is not None:
+        if name != REFERENCE and package is not None:
             least, needed = "> " if _is_bound(result) else "", _needed(result)
-            compared = [f"{least}{needed:,.0f}", f"{least}{needed / own['seconds']:.1f}"]
+            compared = [f"{least}{needed:,.0f}", f"{least}{needed / package['seconds']:.1f}"]
         error = _evidence_error(made, unknowns, name)
         evidence = "-" if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}"
         numbers = [f"{result['seconds']:.0f}", f"{result['evaluations']:,}", sampled, *compared, evidence]
@@ -330,17 +335,19 @@ def _recipe_rows(made: Made) -> list[list[str]]:
     rows = []
     for hidden, words in ((False, "nothing hidden"), (True, "wheels hidden")):
         for recipe in Recipe:
-            found = _recipes(made, recipe, hidden)
-            if not found:
+            results = _recipes(made, recipe, hidden)
+            if not results:
                 continue
             errors = _errors(made, recipe, hidden)
-            relative = np.abs([np.subtract(item["mean"], item["truth"]) / np.array(item["truth"]) for item in found])
+            relative = np.abs(
+                [np.subtract(result["mean"], result["truth"]) / np.array(result["truth"]) for result in results]
+            )
             rows.append(
                 [
                     f"{TITLES[recipe]}, {words}",
-                    str(len(found)),
+                    str(len(results)),
                     str(lines(recipe)),
-                    f"{np.median([item['seconds'] for item in found]):.0f}",
+                    f"{np.median([result['seconds'] for result in results]):.0f}",
                     f"{100.0 * relative[:, 0].mean():.3f}",
                     f"{100.0 * relative[:, 4:7].mean():.3f}",
                     _inside(errors),
@@ -350,17 +357,17 @@ def _recipe_rows(made: Made) -> list[list[str]]:
     return rows
 
 
-def _found(made: Made, unknowns: int, sampler: str) -> Mapping[str, Any] | None:
-    for item in made:
-        if item["task"].get("unknowns") == unknowns and item["task"]["sampler"] == sampler:
-            result: Mapping[str, Any] = item["result"]
+def _result_of(made: Made, unknowns: int, sampler: str) -> Mapping[str, Any] | None:
+    for trial in made:
+        if trial["task"].get("unknowns") == unknowns and trial["task"]["sampler"] == sampler:
+            result: Mapping[str, Any] = trial["result"]
             return result
     return None
 
 
 def _peers(made: Made, unknowns: int) -> dict[Sampler, Mapping[str, Any]]:
-    found = {name: _found(made, unknowns, name) for name in list(Sampler)[1:]}
-    return {name: result for name, result in found.items() if result is not None}
+    results = {name: _result_of(made, unknowns, name) for name in list(Sampler)[1:]}
+    return {name: result for name, result in results.items() if result is not None}
 
 
 def _needed(result: Mapping[str, Any]) -> float:
@@ -376,30 +383,30 @@ def _is_bound(result: Mapping[str, Any]) -> bool:
 
 def _evidence_error(made: Made, unknowns: int, sampler: str) -> tuple[float, float, float] | None:
     """Return the error of a log evidence, its standard error, and the part that the sampler states."""
-    result, reference = _found(made, unknowns, sampler), _found(made, unknowns, REFERENCE)
+    result, reference = _result_of(made, unknowns, sampler), _result_of(made, unknowns, REFERENCE)
     if result is None or reference is None or result["log_evidence"] is None or sampler == REFERENCE:
         return None
-    own = result["log_evidence_error"]
-    both = float(np.hypot(own, reference["log_evidence_error"]))
-    return float(result["log_evidence"] - reference["log_evidence"]), both, own
+    stated = result["log_evidence_error"]
+    both = float(np.hypot(stated, reference["log_evidence_error"]))
+    return float(result["log_evidence"] - reference["log_evidence"]), both, stated
 
 
 def _recipes(made: Made, recipe: Recipe, hidden: bool) -> list[Mapping[str, Any]]:
     return [
-        item["result"] for item in made if item["task"].get("recipe") == recipe and item["task"]["hidden"] is hidden
+        trial["result"] for trial in made if trial["task"].get("recipe") == recipe and trial["task"]["hidden"] is hidden
     ]
 
 
 def _errors(made: Made, recipe: Recipe, hidden: bool) -> Floats:
     """Return the errors in stated standard deviations, shape (studies, 10)."""
-    found = _recipes(made, recipe, hidden)
-    return np.array([np.subtract(item["mean"], item["truth"]) / np.array(item["sd"]) for item in found])
+    results = _recipes(made, recipe, hidden)
+    return np.array([np.subtract(result["mean"], result["truth"]) / np.array(result["sd"]) for result in results])
 
 
 def _rivals(made: Made, hidden: bool) -> dict[str, Floats]:
     """Return the errors of the other recipes in stated standard deviations, (studies, 10), by the name of each."""
-    found = {TITLES[recipe]: _errors(made, recipe, hidden) for recipe in Recipe if recipe is not Recipe.BAYESID}
-    return {name: errors for name, errors in found.items() if len(errors)}
+    by_recipe = {TITLES[recipe]: _errors(made, recipe, hidden) for recipe in Recipe if recipe is not Recipe.BAYESID}
+    return {name: errors for name, errors in by_recipe.items() if len(errors)}
 
 
 def _inside(errors: Floats) -> str:
@@ -418,13 +425,13 @@ def time_figure(made: Made) -> Figure:
     """Draw the time to the wanted samples against the number of unknowns; samplers stand beside each other."""
     figure = wide_figure(2.5)
     axes = figure.subplots()
-    shown = [name for name in Sampler if any(_found(made, size, name) for size in CASES)]
+    shown = [name for name in Sampler if any(_result_of(made, size, name) for size in CASES)]
     needed: list[float] = []
     for number, (colour, name) in enumerate(zip(COLOURS, shown, strict=False)):
         beside = 1.035 ** (number - 0.5 * (len(shown) - 1))
         axes.plot([], [], "o", color=colour, markersize=5, label=str(name))
         for size in sorted(CASES):
-            result = _found(made, size, name)
+            result = _result_of(made, size, name)
             if result is not None:
                 filled = colour if result["effective_samples"] >= EFFECTIVE else "white"
                 needed.append(_needed(result))

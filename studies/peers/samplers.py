@@ -119,9 +119,9 @@ class _Counted:
 
 def _sampled(target: Target, budget: Budget, rng: np.random.Generator) -> tuple[Evidence, Chains]:
     """Sample as `bayesid.identify` does once it has the mode: importance sampling, then emcee with its own moves."""
-    evidence, wanted = importance_sample(target.parameterisation, target.optimum, rng), budget.effective_samples
+    evidence, effective = importance_sample(target.parameterisation, target.optimum, rng), budget.effective_samples
     seed, trusted = int(rng.integers(2**31)), evidence.trusted
-    return evidence, sample(target.parameterisation, target.optimum, seed, effective_samples=wanted, trusted=trusted)
+    return evidence, sample(target.parameterisation, target.optimum, seed, effective_samples=effective, trusted=trusted)
 
 
 def ours(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
@@ -238,10 +238,10 @@ def dynesty(target: Target, budget: Budget, rng: np.random.Generator) -> Reached
     with warnings.catch_warnings():  # whether it was stopped is among what is returned
         warnings.filterwarnings("ignore", "The sampling was stopped short", UserWarning)
         sampler.run_nested(n_effective=int(budget.effective_samples), maxcall=calls, print_progress=False)
-    found = sampler.results
-    effective = float(get_neff_from_logwt(found.logwt))
-    evidence = float(found.logz[-1]), float(found.logzerr[-1])
-    mean = (found.importance_weights() @ found.samples).tolist()
+    results = sampler.results
+    effective = float(get_neff_from_logwt(results.logwt))
+    evidence = float(results.logz[-1]), float(results.logzerr[-1])
+    mean = (results.importance_weights() @ results.samples).tolist()
     enough = effective >= budget.effective_samples
     return Reached(clock.seconds, density.evaluations, 0, effective, enough, *evidence, mean)
 
@@ -294,8 +294,8 @@ def reference(target: Target, budget: Budget, rng: np.random.Generator) -> Reach
         draws = proposal.draw(int(budget.effective_samples), rng)
         evaluations += len(draws)
         proposed = target.parameterisation.log_density(draws) - proposal.log_density(draws)
-        own = y[bridged].reshape(-1, target.size)
-        sampled = chains.log_density[bridged].ravel() - proposal.log_density(own)
+        held_out = y[bridged].reshape(-1, target.size)
+        sampled = chains.log_density[bridged].ravel() - proposal.log_density(held_out)
         values.append(bridge(sampled, proposed, effective_samples(np.concatenate(y[bridged], axis=1))))
     (first, error), (second, other) = values
     x = target.whitened(y.reshape(-1, target.size))

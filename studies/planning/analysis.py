@@ -64,7 +64,7 @@ def planners_model(arm_spread: float) -> Model:
 
 def true_ship(rng: np.random.Generator, arm_spread: float) -> Robot:
     """Draw the true ship from what the planner holds possible."""
-    robot = mission.true_arm(mission.ship(), rng, arm_spread)
+    robot = mission.true_arm(mission.published_robot(), rng, arm_spread)
     return robot.with_inertial(BASE, draw_inertial(robot.link(BASE).inertial, SPREAD, rng))
 
 
@@ -124,10 +124,10 @@ class Planner:
             turn = Rotation.from_quat(pose.attitude[0]) * Rotation.from_quat(attitude).inv()
             return np.concatenate([pose.position[0] - position, ARM * turn.as_rotvec()])
 
-        found = root(miss, self.first.goal, tol=1e-9)
-        if not found.success:
-            raise RuntimeError(f"no path to the target was found: {found.message}")
-        return Swing(self.first.start, found.x)
+        solution = root(miss, self.first.goal, tol=1e-9)
+        if not solution.success:
+            raise RuntimeError(f"no path to the target was found: {solution.message}")
+        return Swing(self.first.start, solution.x)
 
     @property
     def _count(self) -> int:
@@ -194,7 +194,7 @@ class Row:
     """Outcome over N drawn ships with one knowledge of the arm; stages are those of `STAGES`."""
 
     miss: Floats  # (N, 2 stages, 2): distance [mm] and angle [degrees] of the end-effector from its target
-    held: NDArray[np.bool_]  # (N, 2 stages, 2 bodies, 2 kinds): whether the 95 % regions held the flown poses
+    inside: NDArray[np.bool_]  # (N, 2 stages, 2 bodies, 2 kinds): whether the 95 % regions held the flown poses
     size: Floats  # (N, 2 stages, 2 bodies, 2 kinds): longest semi-axes of these regions [mm, degrees]
     # (N,): squared distances of the true base from the identified one; chi-square with ten degrees of freedom if the
     # posterior is right
@@ -202,7 +202,7 @@ class Row:
 
     def share(self, stage: int, body: int, kind: int) -> Share:
         """Return how many regions held."""
-        return Share(int(self.held[:, stage, body, kind].sum()), len(self.held))
+        return Share(int(self.inside[:, stage, body, kind].sum()), len(self.inside))
 
 
 def row_of(
@@ -230,10 +230,10 @@ def row_of(
     """
     task = _Task(tuple(map(float, parameters)), arm_spread)
     outcomes = run_trials(outcome, [task] * count, store, seed=seed, workers=workers, progress=progress).complete()
-    miss, held, size = (
-        np.array([[trip[key] for trip in item["trips"]] for item in outcomes]) for key in ("miss", "held", "size")
+    miss, inside, size = (
+        np.array([[trip[key] for trip in trial["trips"]] for trial in outcomes]) for key in ("miss", "held", "size")
     )
-    return Row(miss, held, size, np.array([item["distance"] for item in outcomes]))
+    return Row(miss, inside, size, np.array([trial["distance"] for trial in outcomes]))
 
 
 def outcome(task: _Task, rng: np.random.Generator) -> dict[str, Any]:
@@ -354,5 +354,5 @@ def run(
     }
     spread = next(iter(mission.ROWS.values()))
     example, _ = trip_of(tuple(map(float, parameters)), spread, np.random.default_rng(seed))
-    course = flown_along(mission.ship(), Planner(planners_model(spread)).first, mission.DURATION)
+    course = flown_along(mission.published_robot(), Planner(planners_model(spread)).first, mission.DURATION)
     return Result(rows, example, course, full and ships >= SHIPS)

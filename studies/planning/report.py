@@ -47,14 +47,14 @@ def _verdict(shares: list[Share]) -> Verdict:
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
     rows = []
-    for row, own in result.rows.items():
+    for row, flown in result.rows.items():
         for stage, title in enumerate(STAGES):
-            shares = {text: own.share(stage, *index) for index, text in REGIONS.items()}
+            shares = {text: flown.share(stage, *index) for index, text in REGIONS.items()}
             reached = "; ".join(f"{text} {share}" for text, share in shares.items())
             text = f"Regions of the {title} hold what they state, {format_percent(CONTENT)}, {row}"
             rows.append(Goal(text, reached, _verdict(list(shares.values()))))
-    for row, own in result.rows.items():
-        smaller = Share(int((own.miss[:, 1] < own.miss[:, 0]).all(axis=1).sum()), len(own.miss))
+    for row, flown in result.rows.items():
+        smaller = Share(int((flown.miss[:, 1] < flown.miss[:, 0]).all(axis=1).sum()), len(flown.miss))
         text = f"The plan with the identified ship misses less, position and rotation, {row}"
         rows.append(Goal(text, str(smaller), Verdict.of(smaller.interval[0] > 0.5)))
     speed, rate = result.course.largest("tip_speed"), result.course.largest("tip_rate")
@@ -113,15 +113,15 @@ def _report(result: Result) -> Report[Result]:
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     texts = []
-    for row, own in result.rows.items():
-        mean, error = own.distance.mean(), own.distance.std(ddof=1) / np.sqrt(len(own.distance))
-        missed = {text: int((~own.held[:, 1, body, kind]).sum()) for (body, kind), text in REGIONS.items()}
+    for row, flown in result.rows.items():
+        mean, error = flown.distance.mean(), flown.distance.std(ddof=1) / np.sqrt(len(flown.distance))
+        missed = {text: int((~flown.inside[:, 1, body, kind]).sum()) for (body, kind), text in REGIONS.items()}
         worst = max(missed, key=lambda text: missed[text])
         texts.append(
             f"{row.capitalize()}: the squared distance of the true base from the identified one is "
             f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} where 10 are expected; after "
-            f"identification the regions of the {worst} hold least: {missed[worst]} of {len(own.held)} do not hold the "
-            f"flown one, where {format_fixed((1.0 - CONTENT) * len(own.held), 1)} are due."
+            f"identification the regions of the {worst} hold least: {missed[worst]} of {len(flown.inside)} do not hold "
+            f"the flown one, where {format_fixed((1.0 - CONTENT) * len(flown.inside), 1)} are due."
         )
     texts.append(
         "The regions have the proportions of the draws' covariance and are as large as the draws want. The truth is a "
@@ -133,15 +133,15 @@ def _failures(document: Document, result: Result) -> None:
 def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     cells = []
-    for row, own in result.rows.items():
+    for row, flown in result.rows.items():
         for stage, title in enumerate(STAGES):
             misses = [
-                format_number(float(np.quantile(own.miss[:, stage, kind], part)), 2)
+                format_number(float(np.quantile(flown.miss[:, stage, kind], part)), 2)
                 for kind in range(len(KINDS))
                 for part in (0.5, 0.95)
             ]
-            sizes = [format_number(float(np.median(own.size[:, stage, 1, kind])), 2) for kind in range(len(KINDS))]
-            counts = [f"{own.held[:, stage, body, kind].sum()} of {len(own.held)}" for body, kind in REGIONS]
+            sizes = [format_number(float(np.median(flown.size[:, stage, 1, kind])), 2) for kind in range(len(KINDS))]
+            counts = [f"{flown.inside[:, stage, body, kind].sum()} of {len(flown.inside)}" for body, kind in REGIONS]
             cells.append([row.removeprefix("arm "), title, *misses, *sizes, *counts])
     add_number_table(
         document,
@@ -172,14 +172,14 @@ def _evidence(document: Document, result: Result) -> None:
 
 
 def _statements(result: Result) -> list[Statement]:
-    own = result.rows[HEADLINE]
-    gain = float(np.median(own.miss[:, 0, 0] / own.miss[:, 1, 0]))
+    headline = result.rows[HEADLINE]
+    gain = float(np.median(headline.miss[:, 0, 0] / headline.miss[:, 1, 0]))
     return [
         Statement(
             "A path planned in joint space for a final state in inertial space ends wrong if the parameters are "
             "(1.1.1).",
-            Finding.CONFIRMED if np.median(own.miss[:, 0, 0]) > 1.0 else Finding.REFUTED,
-            f"With the base known to {format_percent(2.0 * SPREAD)} the median miss is {_median(own, 0, 0)} mm.",
+            Finding.CONFIRMED if np.median(headline.miss[:, 0, 0]) > 1.0 else Finding.REFUTED,
+            f"With the base known to {format_percent(2.0 * SPREAD)} the median miss is {_median(headline, 0, 0)} mm.",
         ),
         Statement(
             "Identification has to be performed before any operational phase (1.1.1).",
@@ -194,9 +194,9 @@ def _table(result: Result) -> CsvTable:
     header = ["arm", "ship", "planned with", "miss [mm]", "miss [degrees]"]
     header += [f"{body} {kind} held" for body in BODIES for kind in KINDS]
     lines = [
-        [row, ship, title, *map(float, own.miss[ship, stage]), *map(int, own.held[ship, stage].ravel())]
-        for row, own in result.rows.items()
-        for ship in range(len(own.miss))
+        [row, number, title, *map(float, flown.miss[number, stage]), *map(int, flown.inside[number, stage].ravel())]
+        for row, flown in result.rows.items()
+        for number in range(len(flown.miss))
         for stage, title in enumerate(STAGES)
     ]
     return CsvTable("ships", header, lines)
@@ -207,9 +207,9 @@ def _miss_figure(result: Result) -> Figure:
     figure = wide_figure(2.3)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, kind, unit in zip(panels, range(2), ("mm", "degrees"), strict=True):
-        for (row, own), line in zip(result.rows.items(), ("-", "--"), strict=True):
+        for (row, flown), line in zip(result.rows.items(), ("-", "--"), strict=True):
             for stage, title in enumerate(STAGES):
-                values = np.sort(own.miss[:, stage, kind])
+                values = np.sort(flown.miss[:, stage, kind])
                 share = np.arange(1, len(values) + 1) / len(values)
                 label = title if row == HEADLINE else None
                 axes.plot(values, share, line, color=(BEFORE, AFTER)[stage], label=label)

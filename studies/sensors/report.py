@@ -204,7 +204,7 @@ def _negatives(document: Document, result: Result) -> None:
 
 def _linear(result: Result) -> str:
     level, regressions = next(iter(result.regressions.items()))
-    name, best = min(regressions.items(), key=lambda item: float((item[1][:, MASS] ** 2).mean()))
+    name, best = min(regressions.items(), key=lambda regression: float((regression[1][:, MASS] ** 2).mean()))
     raw, closed, least = (
         format_percent(float(value), digits)
         for value, digits in (

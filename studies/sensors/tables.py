@@ -129,7 +129,7 @@ def refit_rows(result: Result) -> Iterator[tuple[object, ...]]:
     """Yield noise, estimator, fits, diverged fits, then median errors of mass, nonlinear and linear, and difference."""
     for level, procedures in result.refits.items():
         for name, refits in procedures.items():
-            medians = [np.median(np.abs(item.errors[:, MASS])) for item in (refits.nonlinear, refits.linear)]
+            medians = [np.median(np.abs(fits.errors[:, MASS])) for fits in (refits.nonlinear, refits.linear)]
             difference = float(refits.difference[JUDGED].max())
             count = len(refits.diverged)
             yield level, name, count, int(refits.diverged.sum()), *(f"{value:.4g}" for value in (*medians, difference))

@@ -107,9 +107,9 @@ def separating_problem(points: int = mission.POINTS) -> Problem:
 
     Manoeuvres start at the rate that the first manoeuvre has shown.
     """
-    own = mission.problem(rival_model(RIVALS), mission.splines(points), DOptimal(), Separation(RIVALS))
-    unknowns = own.plan.unknowns
-    return own.knowing(Known(drifting(unknowns), np.eye(unknowns.size)))
+    problem = mission.problem(rival_model(RIVALS), mission.splines(points), DOptimal(), Separation(RIVALS))
+    unknowns = problem.plan.unknowns
+    return problem.knowing(Known(drifting(unknowns), np.eye(unknowns.size)))
 
 
 def design_both(
@@ -117,7 +117,7 @@ def design_both(
 ) -> dict[str, Designed]:
     """Design by both criteria from the same random starts, the second also from the first's best."""
     problem = adapted_to_family(problem, np.random.default_rng(seed))
-    found: list[np.ndarray] = []
+    optima: list[np.ndarray] = []
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
         best = optimise(
@@ -125,20 +125,20 @@ def design_both(
             criterion,
             np.random.default_rng(seed),
             search,
-            first=found,
+            first=optima,
             known=kept.known,
             keep=kept.keep,
             progress=lambda _, text: progress(text),
         )
-        found.append(best.parameters)
+        optima.append(best.parameters)
     return {
         criterion.name: Designed(
             costs=problem.costs(best),
-            largest={item.name: item.largest for item in problem.reached(best)},
+            largest={limit.name: limit.largest for limit in problem.reached(best)},
             motion=problem.plan.family.motion(best),
             left_out=dict(criterion.unseen),
         )
-        for criterion, best in zip(problem.criteria, found, strict=True)
+        for criterion, best in zip(problem.criteria, optima, strict=True)
     }
 
 
@@ -347,7 +347,7 @@ def realise(
     def compared(task: tuple[str, int], rng: np.random.Generator) -> dict[str, Any]:
         """Return the log Bayes factors of one truth from one set of flights."""
         truth, _ = task
-        robot, bias = mission.true_arm(mission.ship(), rng, arm_spread), BIAS * rng.standard_normal(3)
+        robot, bias = mission.true_arm(mission.published_robot(), rng, arm_spread), BIAS * rng.standard_normal(3)
         single = {}
         for name, motion in motions.items():
             run = flown(motion, truth, TRUTHS[truth], robot=robot)
@@ -418,7 +418,7 @@ def run(
     flights = (FLIGHTS if full else 40) if flights is None else flights
     designs = design_both(separating_problem(points), seed, search, store or Store.forgetful(), progress)
     motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
-    motions |= {name: item.motion for name, item in designs.items()}
+    motions |= {name: design.motion for name, design in designs.items()}
     known = references(motions)
     expected, directions = expectations(known, seed)
     realised = realise(motions, known, flights, seed, trials, progress)

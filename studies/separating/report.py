@@ -37,9 +37,9 @@ HIDDEN = {
 NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}  # short names of the two causes
 
 
-def _preferred(item: analysis.Realised, stage: str) -> Share:
+def _preferred(flown: analysis.Realised, stage: str) -> Share:
     """Return in how many of the flights the true cause is preferred with a probability of 0.9 or more."""
-    values = item.factors[stage]
+    values = flown.factors[stage]
     return Share(int((values > RIVALRY).sum()), len(values))
 
 
@@ -49,8 +49,8 @@ def _counts(share: Share) -> str:
 
 def _shown(result: Result, truth: str, stage: str) -> Share:
     """Return in how many of the random directions the factor is expected above the limit in enough flights."""
-    found = result.directions[truth, stage]
-    return Share(sum(item.exceeding(RIVALRY) >= SURE for item in found), len(found))
+    directions = result.directions[truth, stage]
+    return Share(sum(direction.exceeding(RIVALRY) >= SURE for direction in directions), len(directions))
 
 
 def _decided(share: Share) -> Verdict:
@@ -62,12 +62,12 @@ def _decided(share: Share) -> Verdict:
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
     rows = []
-    for item in result.realised:
-        values = item.factors[LAST]
-        text = f"Hidden {NAMES[item.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
-        share = _preferred(item, LAST)
+    for flown in result.realised:
+        values = flown.factors[LAST]
+        text = f"Hidden {NAMES[flown.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
+        share = _preferred(flown, LAST)
         rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share)))
-        text = f"Hidden {NAMES[item.truth]}: {analysis.FLIGHTS} sets of flights"
+        text = f"Hidden {NAMES[flown.truth]}: {analysis.FLIGHTS} sets of flights"
         rows.append(Goal(text, f"{len(values)} made", Verdict.of(len(values) >= analysis.FLIGHTS)))
     for truth in analysis.RIVALS:
         share = _shown(result, truth, LAST)
@@ -77,10 +77,10 @@ def goals(result: Result) -> tuple[Goal, ...]:
             f"in {percent} of the directions"
         )
         rows.append(Goal(text, str(share), _decided(share)))
-    for item in result.realised:
-        gain = item.factors[LAST] - item.factors["first, d-optimal"]
+    for flown in result.realised:
+        gain = flown.factors[LAST] - flown.factors["first, d-optimal"]
         error = gain.std(ddof=1) / np.sqrt(len(gain))
-        text = f"Hidden {NAMES[item.truth]}: the separating manoeuvre tells more than the d-optimal one"
+        text = f"Hidden {NAMES[flown.truth]}: the separating manoeuvre tells more than the d-optimal one"
         reached = (
             f"ln B {format_fixed(abs(gain.mean()), 1)} ± {format_fixed(error, 1)} "
             f"{'higher' if gain.mean() > 0.0 else 'lower'}"
@@ -88,9 +88,9 @@ def goals(result: Result) -> tuple[Goal, ...]:
         verdict = Verdict.OPEN if abs(gain.mean()) < 2.0 * error else Verdict.of(gain.mean() > 0.0)
         rows.append(Goal(text, reached, verdict))
     far = [
-        abs(item.factors[stage].mean() - result.expected[item.truth, stage].log_factor)
-        / (item.factors[stage].std(ddof=1) / np.sqrt(len(item.factors[stage])))
-        for item in result.realised
+        abs(flown.factors[stage].mean() - result.expected[flown.truth, stage].log_factor)
+        / (flown.factors[stage].std(ddof=1) / np.sqrt(len(flown.factors[stage])))
+        for flown in result.realised
         for stage in analysis.STAGES
     ]
     reached = f"{format_fixed(max(far), 1)} at most, {len(far)} means"
@@ -169,14 +169,14 @@ def _left_out(result: Result) -> str:
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     texts = []
-    for item in result.realised:
-        shown = _counts(_shown(result, item.truth, LAST))
-        low, middle = np.quantile([other.log_factor for other in result.directions[item.truth, LAST]], [0.1, 0.5])
+    for flown in result.realised:
+        shown = _counts(_shown(result, flown.truth, LAST))
+        low, middle = np.quantile([other.log_factor for other in result.directions[flown.truth, LAST]], [0.1, 0.5])
         texts.append(
-            f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
-            f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the expected "
-            f"ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median and "
-            f"{format_fixed(low, 1)} at the lowest tenth; in {shown} directions it is above {RIVALRY} in "
+            f"Hidden {HIDDEN[flown.truth]}: the first manoeuvre alone shows the cause with ln B "
+            f"{format_fixed(flown.detected.mean(), 1)} against none. In random directions of the same size the "
+            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
+            f"and {format_fixed(low, 1)} at the lowest tenth; in {shown} directions it is above {RIVALRY} in "
             f"{format_percent(SURE)} of flights or more."
         )
     texts.append(
@@ -189,9 +189,9 @@ def _failures(document: Document, result: Result) -> None:
 def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     rows = []
-    for item in result.realised:
-        for stage, values in item.factors.items():
-            expected = result.expected[item.truth, stage]
+    for flown in result.realised:
+        for stage, values in flown.factors.items():
+            expected = result.expected[flown.truth, stage]
             cells = [
                 expected.alone,
                 expected.energy,
@@ -201,8 +201,8 @@ def _evidence(document: Document, result: Result) -> None:
                 expected.sd,
             ]
             numbers = [format_fixed(float(cell), 1) for cell in cells]
-            shares = [_counts(_preferred(item, stage)), _counts(_shown(result, item.truth, stage))]
-            rows.append([NAMES[item.truth], stage, *numbers, *shares])
+            shares = [_counts(_preferred(flown, stage)), _counts(_shown(result, flown.truth, stage))]
+            rows.append([NAMES[flown.truth], stage, *numbers, *shares])
     titles = ["λ", "λ(1−ρ²)/2", "expected ln B", "mean ln B", "sd ln B", "expected sd", "preferred", "directions"]
     document.table(
         ["hidden", "manoeuvres", *titles],
@@ -223,13 +223,13 @@ def _evidence(document: Document, result: Result) -> None:
 
 def _tables(result: Result) -> list[CsvTable]:
     factors = [
-        [item.truth, stage, number, float(value)]
-        for item in result.realised
-        for stage, values in item.factors.items()
+        [flown.truth, stage, number, float(value)]
+        for flown in result.realised
+        for stage, values in flown.factors.items()
         for number, value in enumerate(values)
     ]
     names = next(iter(result.designs.values())).motion.family.names
-    parameters = [[name, *map(float, np.asarray(item.motion.parameters))] for name, item in result.designs.items()]
+    parameters = [[name, *map(float, np.asarray(design.motion.parameters))] for name, design in result.designs.items()]
     return [
         CsvTable("factors", ["hidden", "manoeuvres", "flight", "log Bayes factor"], factors),
         CsvTable("manoeuvres", ["manoeuvre", *names], parameters),
@@ -240,18 +240,18 @@ def _tables(result: Result) -> list[CsvTable]:
 def factor_figure(result: Result) -> Figure:
     """Draw every log Bayes factor beside its expectation."""
     figure = wide_figure(2.7)
-    for axes, item in zip(figure.subplots(1, len(result.realised), sharey=True), result.realised, strict=True):
+    for axes, hidden in zip(figure.subplots(1, len(result.realised), sharey=True), result.realised, strict=True):
         place = np.arange(len(analysis.STAGES))
-        expected = [result.expected[item.truth, stage] for stage in analysis.STAGES]
+        expected = [result.expected[hidden.truth, stage] for stage in analysis.STAGES]
         means, sds = [each.log_factor for each in expected], [each.sd for each in expected]
         bars: dict[str, Any] = {"fmt": "s", "color": COLOURS[1], "markersize": 4, "capsize": 3}
         axes.errorbar(place - 0.15, means, sds, label="expected", **bars)
-        realised = np.stack([item.factors[stage] for stage in analysis.STAGES])
+        realised = np.stack([hidden.factors[stage] for stage in analysis.STAGES])
         shift = np.linspace(0.05, 0.3, realised.shape[1])
         axes.plot((place[:, None] + shift).ravel(), realised.ravel(), ".", color=COLOURS[0], label="realised")
         axes.axhline(RIVALRY, color="#888888", linewidth=0.8)
         axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in analysis.STAGES])
-        axes.set(title=f"hidden: {HIDDEN[item.truth]}", xlim=(-0.5, place[-1] + 0.5))
+        axes.set(title=f"hidden: {HIDDEN[hidden.truth]}", xlim=(-0.5, place[-1] + 0.5))
         axes.set_yscale("symlog", linthresh=1.0)
         axes.set_yticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
         axes.grid(visible=False, axis="x")
@@ -265,7 +265,7 @@ def _direction_figure(result: Result) -> Figure:
     figure = wide_figure(2.3)
     for axes, truth in zip(figure.subplots(1, 2, sharey=True), analysis.RIVALS, strict=True):
         for index, stage in enumerate(analysis.STAGES):
-            values = np.sort([item.log_factor for item in result.directions[truth, stage]])
+            values = np.sort([direction.log_factor for direction in result.directions[truth, stage]])
             share = np.arange(1, len(values) + 1) / len(values)
             axes.plot(values, share, label=stage, **curve_style(index))
         axes.axvline(RIVALRY, color="#888888", linewidth=0.8)

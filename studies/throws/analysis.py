@@ -14,8 +14,8 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import WHEEL_INERTIA, Timing, Truth, read_throws, regress
 from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, maximise_jointly, width_of
-from studies.throws.left_over import LeftOver, left_over
-from studies.throws.model import STEP, extended, is_calibration, is_own, manoeuvres
+from studies.throws.model import STEP, extended, is_calibration, is_local, manoeuvres
+from studies.throws.residual import Residual, residual_of
 
 PLATE_SD = 0.03  # relative uncertainty of the plate's moments, which are from the authors' CAD: "a few percent"
 
@@ -127,7 +127,7 @@ class BodyResult:
         freedom = len(self.throws) / (len(self.throws) - 1.0)
         return float(np.sqrt(freedom * (((self.moments - self.moments.mean(axis=0)) / self.formal) ** 2).mean()))
 
-    def held(self, level: float, *, with_truth: bool = False) -> tuple[int, int]:
+    def covered(self, level: float, *, with_truth: bool = False) -> tuple[int, int]:
         """Return how many intervals of single throws hold the truth at a level, and of how many.
 
         With ``with_truth`` the interval counts what all throws share as well: the truth's own uncertainty, and that of
@@ -161,7 +161,7 @@ class Analysis:
     noise: Mapping[str, Floats]  # noise of gyro and accelerometer relative to that of quiet stretches
     # unknowns of the device, in standard deviations of their priors times those: physical units
     calibration: Mapping[str, tuple[float, float]]
-    left: Mapping[str, LeftOver]  # what the model leaves, by body; empty for a rigid model
+    left: Mapping[str, Residual]  # what the model leaves, by body; empty for a rigid model
     converged: bool
 
 
@@ -197,8 +197,8 @@ def analyse(
     """
     started: list[Throw] = []
     for body in truth.bodies:  # each body alone first: from there the fit of all needs a few steps
-        own = [throw for throw in throws if throw.body == body]
-        started += fit_widths(own, free) if smooth else maximise_jointly(own, free).throws
+        of_body = [throw for throw in throws if throw.body == body]
+        started += fit_widths(of_body, free) if smooth else maximise_jointly(of_body, free).throws
     joint = maximise_jointly(started, free)
     posteriors = {throw.body: throw.posterior for throw in throws}
     wheel, moments = _bodies(posteriors, joint, joint.value[None], truth)
@@ -210,12 +210,12 @@ def analyse(
     results = {}
     for body in truth.objects:
         single = [throw for throw in joint.throws if throw.body == body]
-        found = [_single(throw, free, device, float(wheel[0]), truth, rng) for throw in single]
+        fitted = [_single(throw, free, device, float(wheel[0]), truth, rng) for throw in single]
         results[body] = BodyResult(
             name=body,
             throws=tuple(throw.name for throw in single),
-            moments=np.array([value for value, _ in found]),
-            formal=np.array([sd for _, sd in found]),
+            moments=np.array([value for value, _ in fitted]),
+            formal=np.array([sd for _, sd in fitted]),
             joint=moments[body][0],
             joint_formal=draws[body].std(axis=0),
             joint_jackknife=_jackknife(left[body], groups),
@@ -231,7 +231,7 @@ def analyse(
         widths={b: {e: width_of(joint, b, e) for e in SMOOTH} for b in truth.bodies} if smooth else {},
         noise={throw.body: throw.noise for throw in joint.throws},
         calibration=_calibration(joint, throws[0].posterior),
-        left={b: left_over([t for t in joint.throws if t.body == b], folder) for b in truth.bodies} if smooth else {},
+        left={b: residual_of([t for t in joint.throws if t.body == b], folder) for b in truth.bodies} if smooth else {},
         converged=joint.converged,
     )
 
@@ -240,10 +240,10 @@ def _bodies(
     posteriors: Mapping[str, Posterior], joint: Joint, values: Floats, truth: Truth
 ) -> tuple[Floats, dict[str, Floats]]:
     """Wheel's inertia (n,) and principal moments (n, 3) of the bodies at many points of the shared unknowns."""
-    found = {body: tensors(posteriors[body], joint.body_coordinates(body, values)) for body in truth.bodies}
-    wheel = wheel_inertia(found["cal_device"], found["cal_proof"], truth)
+    by_body = {body: tensors(posteriors[body], joint.body_coordinates(body, values)) for body in truth.bodies}
+    wheel = wheel_inertia(by_body["cal_device"], by_body["cal_proof"], truth)
     moments = {
-        body: object_moments(found["cal_device"], found[body], wheel, truth.device_mass, truth.mass[body])
+        body: object_moments(by_body["cal_device"], by_body[body], wheel, truth.device_mass, truth.mass[body])
         for body in truth.objects
     }
     return wheel, moments
@@ -253,10 +253,10 @@ def _single(
     throw: Throw, free: Callable[[str], bool], device: Tensor, wheel: float, truth: Truth, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Principal moments of one throw and their formal standard deviations; device, wheel and drag as found jointly."""
-    alone = maximise_jointly([throw], lambda name: free(name) and (is_own(name) or "base_link" in name))
+    alone = maximise_jointly([throw], lambda name: free(name) and (is_local(name) or "base_link" in name))
     points = alone.body_coordinates(throw.body, np.concatenate([alone.value[None], alone.draw(DRAWS, rng)]))
-    found = tensors(throw.posterior, points)
-    values = object_moments(device, found, wheel, truth.device_mass, truth.mass[throw.body])
+    fitted = tensors(throw.posterior, points)
+    values = object_moments(device, fitted, wheel, truth.device_mass, truth.mass[throw.body])
     return values[0], values[1:].std(axis=0)
 
 
@@ -264,9 +264,9 @@ def _jackknife(left: Floats, groups: Sequence[str]) -> Floats:
     """Return the standard error of values (n, k), each with one throw left out; throws vary within their body."""
     total = np.zeros(left.shape[1])
     for body in dict.fromkeys(groups):
-        own = left[np.array(groups) == body]
-        if len(own) > 1:
-            total += (len(own) - 1.0) / len(own) * ((own - own.mean(axis=0)) ** 2).sum(axis=0)
+        of_body = left[np.array(groups) == body]
+        if len(of_body) > 1:
+            total += (len(of_body) - 1.0) / len(of_body) * ((of_body - of_body.mean(axis=0)) ** 2).sum(axis=0)
     return np.sqrt(total)
 
 

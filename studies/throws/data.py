@@ -128,8 +128,8 @@ def read_throws(folder: Path, body: str, timing: Timing, count: int | None = Non
     InputError
         If there are none.
     """
-    found = sorted((folder / "throws").glob(f"{body}_LOG*.csv"))
-    files = [file for file in found if file.stem not in EXCLUDED]
+    logs = sorted((folder / "throws").glob(f"{body}_LOG*.csv"))
+    files = [file for file in logs if file.stem not in EXCLUDED]
     if not files:
         raise InputError(f"no throws of {body!r}", file=folder / "throws", remedy=_REMEDY)
     return [_recording(file, timing) for file in files[:count]]
@@ -179,8 +179,8 @@ def _wheel_speed(clock: Floats, erpm: Floats, grid: Floats, timing: Timing) -> F
     value, instant = erpm[new], clock[new]
     period = np.minimum(np.where(value > 0.0, 60.0 / (100.0 * np.maximum(value, 1.0)), 0.0), 0.02)
     fine = np.arange(grid[0] - 5.0 * SMOOTH, grid[-1] + 5.0 * SMOOTH, 0.25e-3)
-    held = np.interp(fine, instant - timing.delay - timing.delay_periods * period, -value * WHEEL_COUNT)
-    return _weights(grid, fine) @ held
+    speed = np.interp(fine, instant - timing.delay - timing.delay_periods * period, -value * WHEEL_COUNT)
+    return _weights(grid, fine) @ speed
 
 
 SPAN, DEGREE = 13, 5  # samples of one polynomial and its degree
@@ -203,10 +203,10 @@ def quiet_noise(recordings: Sequence[Recording], sensor: str) -> Floats:
         wheel_time, wheel = recording.vector("wheel_momentum")
         slope = np.abs(np.gradient(wheel[:, 2], wheel_time)) / WHEEL_INERTIA
         for first in range(len(time) - SPAN + 1):
-            own = slice(first, first + SPAN)
-            inside = (wheel_time >= time[own][0]) & (wheel_time <= time[own][-1])
-            if time[own][-1] - time[own][0] < (SPAN - 0.5) * INTERVAL and slope[inside].max() < QUIET:
-                square.append((leave @ values[own]) ** 2 / leave[SPAN // 2])
+            stretch = slice(first, first + SPAN)
+            inside = (wheel_time >= time[stretch][0]) & (wheel_time <= time[stretch][-1])
+            if time[stretch][-1] - time[stretch][0] < (SPAN - 0.5) * INTERVAL and slope[inside].max() < QUIET:
+                square.append((leave @ values[stretch]) ** 2 / leave[SPAN // 2])
     return np.sqrt(np.mean(square, axis=0))
 
 

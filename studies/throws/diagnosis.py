@@ -55,9 +55,11 @@ def device_candidates(model: Model, *, records_wheels: bool, pairs: int = POLE_P
     Effects of the recorded wheel are candidates where it is recorded; ``pairs`` is the number of its pole pairs.
     """
     known = candidates(model, records_wheels=records_wheels, longest=Timing().duration)
-    own = [GyroCross(), GSensitivity(), SmoothTorque(Timing().duration, KNOTS, TORQUE)]
+    of_user = [GyroCross(), GSensitivity(), SmoothTorque(Timing().duration, KNOTS, TORQUE)]
     wheel = [WheelTilt(), WheelDelay(), WheelImbalance(POLE_PAIRS / pairs)] if records_wheels else []
-    return [effect for effect in known if effect.label in CATALOGUE] + [e.attach(model.robot) for e in (*own, *wheel)]
+    return [effect for effect in known if effect.label in CATALOGUE] + [
+        e.attach(model.robot) for e in (*of_user, *wheel)
+    ]
 
 
 @dataclass(frozen=True)
@@ -100,21 +102,21 @@ def lacking(
 ) -> Lacking:
     """Diagnose the first throws of a body, and predict further ones with the rigid and with the extended model.
 
-    All throws tell the noise. The wheel's motor has a number of pairs of poles (`left_over.pole_pairs`).
+    All throws tell the noise. The wheel's motor has a number of pairs of poles (`residual.pole_pairs`).
     """
     used, left = recordings[:training], recordings[training : training + TESTING]
     model = rigid(regress(used, mass), SPREAD, recordings)
     throws = manoeuvres(model, used)
     effects = device_candidates(model, records_wheels=True, pairs=pairs)
-    found = diagnose(model, throws, seed, effects=effects, progress=progress)
-    taken = _taken(found)
+    diagnosis = diagnose(model, throws, seed, effects=effects, progress=progress)
+    taken = _taken(diagnosis)
     plain, longer = Posterior.of(model, throws), extended_posterior(taken)
     modes = fit(plain, plain.starting_point()).z, fit(longer, extended_start(taken, longer)).z
     testing = manoeuvres(model, left)
     predicted = (_predict(plain, modes[0], testing), _predict(longer, modes[1], testing))
-    held = HeldOut(tuple(recording.name for recording in left), *predicted)
+    left_out = HeldOut(tuple(recording.name for recording in left), *predicted)
     bodies = {"rigid": tensors(plain, modes[0][None, :10]), "extended": tensors(longer, modes[1][None, :10])}
-    return Lacking(body, tuple(recording.name for recording in used), found, taken, held, bodies)
+    return Lacking(body, tuple(recording.name for recording in used), diagnosis, taken, left_out, bodies)
 
 
 def without_wheel(
@@ -128,8 +130,8 @@ def without_wheel(
     used = recordings[:training]
     model = rigid(regress(used, mass), SPREAD, recordings)
     bare = [
-        replace(item, channels={k: v for k, v in item.channels.items() if not k.startswith("wheel_momentum")})
-        for item in used
+        replace(recording, channels={k: v for k, v in recording.channels.items() if not k.startswith("wheel_momentum")})
+        for recording in used
     ]
     effects = device_candidates(model, records_wheels=False)
     return diagnose(model, manoeuvres(model, bare), seed, effects=effects, progress=progress)
@@ -137,29 +139,29 @@ def without_wheel(
 
 def geometry_errors(studies: Sequence[Lacking], truth: Truth) -> dict[str, dict[str, Floats]]:
     """Errors of the principal moments against the geometry [%], by model and body, from the training throws alone."""
-    found = {study.body: study.body_found for study in studies}
+    fitted = {study.body: study.body_found for study in studies}
     errors: dict[str, dict[str, Floats]] = {}
     for name in ("rigid", "extended"):
-        device = found["cal_device"][name]
-        inertia = wheel_inertia(device, found["cal_proof"][name], truth)
+        device = fitted["cal_device"][name]
+        inertia = wheel_inertia(device, fitted["cal_proof"][name], truth)
         errors[name] = {}
         for body in truth.objects:
-            moments = object_moments(device, found[body][name], inertia, truth.device_mass, truth.mass[body])[0]
+            moments = object_moments(device, fitted[body][name], inertia, truth.device_mass, truth.mass[body])[0]
             errors[name][body] = 100.0 * (moments / truth.moments[body] - 1.0)
     return errors
 
 
-def _taken(found: Diagnosis) -> Hypothesis:
+def _taken(diagnosis: Diagnosis) -> Hypothesis:
     """Return the extended model, or where nothing is named the most probable set of known effects.
 
     Faults of the noise belong to recordings and not to bodies; without them the noise stays as it is declared.
     """
-    if found.alarm.silent:
-        return found.before
-    effects = {effect.label for effect in found.effects}
-    sets = ([cause for cause in item.causes if cause in effects] for item in found.probabilities.sets)
-    named = [cause for cause in found.verdict.causes if cause in effects]
-    return found.fitted(named or next(sets))
+    if diagnosis.alarm.silent:
+        return diagnosis.before
+    effects = {effect.label for effect in diagnosis.effects}
+    sets = ([cause for cause in cause_set.causes if cause in effects] for cause_set in diagnosis.probabilities.sets)
+    named = [cause for cause in diagnosis.verdict.causes if cause in effects]
+    return diagnosis.fitted(named or next(sets))
 
 
 def _predict(posterior: Posterior, z: Floats, testing: Sequence[Manoeuvre]) -> Floats:
@@ -179,12 +181,12 @@ def _predict(posterior: Posterior, z: Floats, testing: Sequence[Manoeuvre]) -> F
 def _alone(whole: Posterior, z: Floats) -> Floats:
     """Fit what belongs to the last throw alone, so that the fit of all starts near its mode."""
     last = f"[{len(whole.manoeuvres) - 1}]"
-    own = [index for index, name in enumerate(whole.unknowns.names) if last in name]
+    last_unknowns = [index for index, name in enumerate(whole.unknowns.names) if last in name]
     for _ in range(ITERATIONS):
-        jacobian = whole.jacobian(z)[:, own]
+        jacobian = whole.jacobian(z)[:, last_unknowns]
         step = np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ whole.least_squares(z))
         z = z.copy()
-        z[own] -= step
+        z[last_unknowns] -= step
         if np.abs(step).max() < 1e-6:
             break
     return z

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior
 from bayesid._math.arrays import Floats
-from studies.throws.model import Smooth, is_calibration, is_fitted, is_own
+from studies.throws.model import Smooth, is_calibration, is_fitted, is_local
 
 ITERATIONS = 40
 HALVINGS = 12
@@ -58,7 +58,7 @@ class Throw:
     def shared(self) -> dict[str, int]:
         """Global names of the unknowns this throw shares, with their place in its own vector."""
         names = enumerate(self.posterior.unknowns.names)
-        return {name if is_calibration(name) else f"{self.body}:{name}": i for i, name in names if not is_own(name)}
+        return {name if is_calibration(name) else f"{self.body}:{name}": i for i, name in names if not is_local(name)}
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Joint:
     throws: tuple[Throw, ...]  # with the unknowns found
     information: Floats  # (throws, n, n)
     pull: Floats  # (throws, n): each throw's own part of the normal equations at the mode, its own unknowns eliminated
-    own_variance: tuple[Floats, ...]  # of each throw's free own unknowns, in the order of its posterior
+    local_variance: tuple[Floats, ...]  # of each throw's free own unknowns, in the order of its posterior
     fitted: Floats  # (throws, 6): number of samples of each axis that the throw's own unknowns absorb
-    own: tuple[NDArray[np.intp], ...]  # which unknowns of each throw these are
+    local: tuple[NDArray[np.intp], ...]  # which unknowns of each throw these are
     converged: bool
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
@@ -103,8 +103,8 @@ class _System:
         place = {name: i for i, name in enumerate(self.names)}
         self.places = [np.array([place[name] for name in names if name in place]) for names in shared]
         self.columns = [np.array([i for name, i in names.items() if name in place]) for names in shared]
-        self.own = [
-            np.array([i for i, name in enumerate(throw.posterior.unknowns.names) if is_own(name) and free(name)])
+        self.local = [
+            np.array([i for i, name in enumerate(throw.posterior.unknowns.names) if is_local(name) and free(name)])
             for throw in throws
         ]
 
@@ -118,14 +118,14 @@ class _System:
     def cost(self, points: Sequence[Floats], value: Floats) -> float:
         """Return the sum of squares of residuals and coordinates."""
         total = float(value @ value)
-        for throw, z, own in zip(self.throws, points, self.own, strict=True):
-            total += float((throw.residuals(z) ** 2).sum() + ((z[own] / throw.width[own]) ** 2).sum())
+        for throw, z, local in zip(self.throws, points, self.local, strict=True):
+            total += float((throw.residuals(z) ** 2).sum() + ((z[local] / throw.width[local]) ** 2).sum())
         return total if np.isfinite(total) else np.inf
 
     def normal_equations(self, points: Sequence[Floats], value: Floats) -> tuple[list[_Block], Floats, Floats]:
         """Return the blocks of the throws, Hessian and gradient of the shared unknowns."""
-        each = zip(self.throws, points, self.own, self.columns, strict=True)
-        blocks = [_eliminate(throw, z, own, columns) for throw, z, own, columns in each]
+        each = zip(self.throws, points, self.local, self.columns, strict=True)
+        blocks = [_eliminate(throw, z, local, columns) for throw, z, local, columns in each]
         hessian, gradient = np.eye(len(value)), value.copy()
         for block, places in zip(blocks, self.places, strict=True):
             hessian[np.ix_(places, places)] += block.information
@@ -138,8 +138,8 @@ class _System:
         """Halve the step until the cost falls; where it never does, stay."""
         for size in 0.5 ** np.arange(HALVINGS):
             trial = self.with_shared(points, value + size * step)
-            for z, block, own, places in zip(trial, blocks, self.own, self.places, strict=True):
-                z[own] += size * (block.own_step + block.own_response @ step[places])
+            for z, block, local, places in zip(trial, blocks, self.local, self.places, strict=True):
+                z[local] += size * (block.local_step + block.local_response @ step[places])
             lower = self.cost(trial, value + size * step)
             if lower < cost:
                 return trial, value + size * step, lower
@@ -173,8 +173,8 @@ def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_f
     pull, covariance, variance = np.zeros(information.shape[:2]), np.linalg.inv(hessian), []
     for index, (block, places) in enumerate(zip(blocks, system.places, strict=True)):
         information[index][np.ix_(places, places)], pull[index, places] = block.information, block.pull
-        response = block.own_response
-        variance.append(block.own_variance + ((response @ covariance[np.ix_(places, places)]) * response).sum(axis=1))
+        response = block.local_response
+        variance.append(block.local_variance + ((response @ covariance[np.ix_(places, places)]) * response).sum(axis=1))
     return Joint(
         names=system.names,
         value=value,
@@ -182,9 +182,9 @@ def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_f
         throws=tuple(replace(throw, z=z) for throw, z in zip(throws, points, strict=True)),
         information=information,
         pull=pull,
-        own_variance=tuple(variance),
+        local_variance=tuple(variance),
         fitted=np.stack([block.fitted for block in blocks]),
-        own=tuple(system.own),
+        local=tuple(system.local),
         converged=converged,
     )
 
@@ -194,17 +194,17 @@ class _Block(NamedTuple):
 
     information: Floats
     pull: Floats
-    own_step: Floats
-    own_response: Floats
-    own_variance: Floats
+    local_step: Floats
+    local_response: Floats
+    local_variance: Floats
     fitted: Floats
 
 
-def _eliminate(throw: Throw, z: Floats, own: NDArray[np.intp], columns: NDArray[np.intp]) -> _Block:
-    residual, jacobian, precision = throw.residuals(z).ravel(), throw.jacobian(z), throw.width[own] ** -2
-    a, b = jacobian[:, columns], jacobian[:, own]
+def _eliminate(throw: Throw, z: Floats, local: NDArray[np.intp], columns: NDArray[np.intp]) -> _Block:
+    residual, jacobian, precision = throw.residuals(z).ravel(), throw.jacobian(z), throw.width[local] ** -2
+    a, b = jacobian[:, columns], jacobian[:, local]
     factor = np.linalg.cholesky(b.T @ b + np.diag(precision))
-    half = np.linalg.solve(factor, np.column_stack([b.T @ a, b.T @ residual + precision * z[own]]))
+    half = np.linalg.solve(factor, np.column_stack([b.T @ a, b.T @ residual + precision * z[local]]))
     mixed, pulled = half[:, :-1], half[:, -1]
     back = np.linalg.solve(factor.T, half)
     variance = (np.linalg.inv(factor) ** 2).sum(axis=0)
@@ -238,13 +238,13 @@ class SmoothWidth:
 def width_of(joint: Joint, body: str, effect: str) -> SmoothWidth:
     """Return the width under which a body was fitted, and what the fit says of it."""
     variance, mean, width, sigma = [], [], 1.0, 1.0
-    for throw, own, spread in zip(joint.throws, joint.own, joint.own_variance, strict=True):
+    for throw, local, spread in zip(joint.throws, joint.local, joint.local_variance, strict=True):
         if throw.body == body:
-            here = _named(throw, effect)[own]
-            value = throw.z[own[here]]
+            here = _named(throw, effect)[local]
+            value = throw.z[local[here]]
             variance += list(spread[here])
             mean += list(value**2)
-            width = float(throw.width[own[here]][0])
+            width = float(throw.width[local[here]][0])
             effects = throw.posterior.model.effects
             sigma = next(e.sigma for e in effects if isinstance(e, Smooth) and e.label == effect)
     ratio = float(np.sqrt(np.mean(mean))) / width

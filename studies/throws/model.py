@@ -274,7 +274,7 @@ def _white(sigma: Floats) -> White:
     return White((float(sigma[0]), float(sigma[1]), float(sigma[2])))
 
 
-def is_own(name: str) -> bool:
+def is_local(name: str) -> bool:
     """Whether an unknown belongs to one throw alone."""
     return "[" in name
 

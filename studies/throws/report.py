@@ -23,17 +23,17 @@ from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult, an
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, EXCLUDED, INTERVAL, Timing, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, Lacking, geometry_errors, lacking, without_wheel
 from studies.throws.joint import LARGEST
-from studies.throws.left_over import (
+from studies.throws.model import is_fitted, is_rigid
+from studies.throws.residual import (
     CHANNELS,
     ORDERS,
     PHASES,
-    LeftOver,
+    Residual,
     following,
     pole_pairs,
     shaken_axis,
     shaking_words,
 )
-from studies.throws.model import is_fitted, is_rigid
 
 QUICK = 4  # throws of each body that a quick run identifies
 TRAINING = 1  # throws of each body that are diagnosed
@@ -114,10 +114,10 @@ def run(
     return Result(plain, extended, studies, errors, wheels, masses, pairs, seconds, perf_counter() - began - seconds)
 
 
-def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
+def covered_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
     """Return how many 95 % intervals of single throws hold the truth over all bodies, and of how many."""
-    counts = [body.held(0.95, with_truth=with_truth) for body in result.extended.bodies.values()]
-    return sum(held for held, _ in counts), sum(total for _, total in counts)
+    counts = [body.covered(0.95, with_truth=with_truth) for body in result.extended.bodies.values()]
+    return sum(covered for covered, _ in counts), sum(total for _, total in counts)
 
 
 def goals_of(result: Result) -> list[Goal]:
@@ -170,7 +170,7 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
 
 
 def _coverage(result: Result) -> Goal:
-    count, total = held_in_all(result)
+    count, total = covered_in_all(result)
     low, high = Share(count, total).interval
     text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
     reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
@@ -186,18 +186,22 @@ def _reverse(result: Result) -> list[Goal]:
     )
     if not result.wheels:
         return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
-    found = list(result.wheels.values())
-    held = [wheel_probability(item) for item in found]
-    named = [any(cause.startswith("wheel-history") for cause in item.verdict.causes) for item in found]
+    diagnoses = list(result.wheels.values())
+    probabilities = [wheel_probability(diagnosis) for diagnosis in diagnoses]
+    named = [any(cause.startswith("wheel-history") for cause in diagnosis.verdict.causes) for diagnosis in diagnoses]
     return [
-        Goal(titles[0], f"at least {min(held):.3f}", Verdict.of(min(held) >= DEFAULT_SETTINGS.named_from)),
+        Goal(
+            titles[0],
+            f"at least {min(probabilities):.3f}",
+            Verdict.of(min(probabilities) >= DEFAULT_SETTINGS.named_from),
+        ),
         Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
     ]
 
 
-def wheel_probability(found: Diagnosis) -> float:
+def wheel_probability(diagnosis: Diagnosis) -> float:
     """Return the probability that a wheel of unknown course about the recorded wheel's axis is at work."""
-    return found.probabilities.of_any(["wheel-history:z"])
+    return diagnosis.probabilities.of_any(["wheel-history:z"])
 
 
 def _tables(result: Result) -> list[CsvTable]:
@@ -222,39 +226,45 @@ def _tables(result: Result) -> list[CsvTable]:
 def _moment_rows(result: Result) -> Iterator[Row]:
     for analysis in (result.plain, result.extended):
         for body in analysis.bodies.values():
-            for throw, found, sd in zip(body.throws, body.moments, body.formal, strict=True):
+            for throw, moments, sd in zip(body.throws, body.moments, body.formal, strict=True):
                 for k, name in enumerate(("smallest", "middle", "largest")):
-                    yield analysis.label, throw, name, *map(_digits, (body.truth[k], found[k], sd[k]))
+                    yield analysis.label, throw, name, *map(_digits, (body.truth[k], moments[k], sd[k]))
 
 
 def _body_rows(result: Result) -> Iterator[Row]:
-    for name, own in result.extended.left.items():
+    for name, residual in result.extended.left.items():
         widths = result.extended.widths[name]
         torque, force = widths["smooth-torque"], widths["smooth-force"]
-        order, there, beside = own.turn
-        axis = shaken_axis(own)
-        numbers = (torque.sd, torque.ratio, force.sd, *result.extended.noise[name], own.wheel[1], order)
+        order, there, beside = residual.turn
+        axis = shaken_axis(residual)
+        numbers = (torque.sd, torque.ratio, force.sd, *result.extended.noise[name], residual.wheel[1], order)
         felt = (there[axis], beside[axis], result.masses[name] * there[axis])
         yield (
-            *(name, len(own.names), *map(_digits, numbers), following(own, result.pairs)),
+            *(name, len(residual.names), *map(_digits, numbers), following(residual, result.pairs)),
             *(CHANNELS[axis][-1], *map(_digits, felt)),
         )
 
 
 def _residual_rows(result: Result) -> Iterator[Row]:
-    for name, own in result.extended.left.items():
+    for name, residual in result.extended.left.items():
         for c, channel in enumerate(AXES):
-            numbers = (own.rms[c], own.quiet[c], own.loudest(c), *own.phase[:, c], *own.shaken[:, c])
+            numbers = (
+                residual.rms[c],
+                residual.quiet[c],
+                residual.loudest(c),
+                *residual.phase[:, c],
+                *residual.shaken[:, c],
+            )
             yield name, channel, *map(_digits, numbers)
 
 
 def _cause_rows(result: Result) -> Iterator[Row]:
-    found = [("as recorded", study.body, study.diagnosis) for study in result.studies]
-    found += [("wheel dropped", body, diagnosis) for body, diagnosis in result.wheels.items()]
-    for title, body, diagnosis in found:
-        for item in diagnosis.probabilities.sets[:SETS]:
-            numbers = (_digits(item.probability), _digits(item.log_evidence))
-            yield title, body, *numbers, " + ".join(item.names) or "nothing"
+    diagnoses = [("as recorded", study.body, study.diagnosis) for study in result.studies]
+    diagnoses += [("wheel dropped", body, diagnosis) for body, diagnosis in result.wheels.items()]
+    for title, body, diagnosis in diagnoses:
+        for cause_set in diagnosis.probabilities.sets[:SETS]:
+            numbers = (_digits(cause_set.probability), _digits(cause_set.log_evidence))
+            yield title, body, *numbers, " + ".join(cause_set.names) or "nothing"
 
 
 def _digits(value: float | np.floating) -> str:
@@ -262,7 +272,7 @@ def _digits(value: float | np.floating) -> str:
 
 
 def _report(result: Result) -> Report[Result]:
-    count, total = held_in_all(result)
+    count, total = covered_in_all(result)
     errors = " and ".join(
         f"{body.mean_error:.2f} % ({body.name}, stated to {_uncertain(body)} %; rigid body: "
         f"{result.plain.bodies[body.name].mean_error:.2f} %)"
@@ -288,7 +298,7 @@ def _report(result: Result) -> Report[Result]:
             "uncertainty of the stated moments.",
         ),
         setup=_setup(result),
-        sections=[_failures, _bodies, _diagnosis, _left_over],
+        sections=[_failures, _bodies, _diagnosis, _residual_section],
         tables=_tables(result),
         beside="Beside this report, in SI units: {all}.",
         credit="Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; no measurement is reproduced here.",
@@ -328,7 +338,7 @@ def _setup(result: Result) -> Setup:
 def _failures(document: Document, result: Result) -> None:
     document.section("What failed, and what cannot be told")
     plain = result.plain.bodies.values()
-    both, total = held_in_all(result, with_truth=True)
+    both, total = covered_in_all(result, with_truth=True)
     factors = [factor.max() for factor in result.extended.noise.values()]
     unsaid = [study.body for study in result.studies if not study.diagnosis.verdict.causes]
     texts = []
@@ -422,33 +432,33 @@ def _diagnosis(document: Document, result: Result) -> None:
     )
     if result.wheels:
         minutes = format_number(result.reverse_seconds / 60.0, 2)
-        held = sum(found.held for found in result.wheels.values())
-        chi2 = [found.gain.before.chi2_per_sample for found in result.wheels.values()]
+        unfitted = sum(diagnosis.held for diagnosis in result.wheels.values())
+        chi2 = [diagnosis.gain.before.chi2_per_sample for diagnosis in result.wheels.values()]
         document.paragraph(
             f"Without the recorded wheel a rigid body leaves chi-square per sample of {format_number(min(chi2), 2)} to "
-            f"{format_number(max(chi2), 2)}, and its fit diverges; on {held} of {len(result.wheels)} bodies the body "
-            f"is held at its prior and causes are weighed along the motion that the data show. This took {minutes} "
-            "minutes. The verdict is unknown wherever the named causes leave more than noise."
+            f"{format_number(max(chi2), 2)}, and its fit diverges; on {unfitted} of {len(result.wheels)} bodies the "
+            f"body is held at its prior and causes are weighed along the motion that the data show. This took "
+            f"{minutes} minutes. The verdict is unknown wherever the named causes leave more than noise."
         )
 
 
-def _likely(found: Diagnosis) -> str:
-    best = found.probabilities.sets[0]
+def _likely(diagnosis: Diagnosis) -> str:
+    best = diagnosis.probabilities.sets[0]
     return f"{' + '.join(best.names) or 'nothing'} ({format_percent(best.probability)})"
 
 
 def _dropped(result: Result, body: str) -> str:
     if body not in result.wheels:
         return "not run"
-    found = result.wheels[body]
-    return f"{format_probability(wheel_probability(found))}, {found.verdict.status.value}"
+    diagnosis = result.wheels[body]
+    return f"{format_probability(wheel_probability(diagnosis))}, {diagnosis.verdict.status.value}"
 
 
-def _left_over(document: Document, result: Result) -> None:
+def _residual_section(document: Document, result: Result) -> None:
     document.section("What stays unexplained")
     document.items(shaking_words(result.extended.left, result.pairs))
     document.figure(
-        left_over_figure(result.extended.left),
+        residual_figure(result.extended.left),
         "What is left, mean over throws. Left: amplitude of the residual of the samples; the bands are the recorded "
         "wheel's frequency where it idles. Right: amplitude of the raw accelerometer at multiples of the recorded "
         "wheel's frequency while it coasts at speed; the line is the loudest.",
@@ -484,20 +494,20 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
 
 
 @styled
-def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
+def residual_figure(left: Mapping[str, Residual]) -> Figure:
     """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
     figure = wide_figure(0.6 + 0.72 * len(left))
     panels = figure.subplots(len(left), 2, sharex="col", squeeze=False)
-    for row, (body, own) in zip(panels, left.items(), strict=True):
-        spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
-        for edge in (own.wheel[0], own.wheel[2]):
+    for row, (body, residual) in zip(panels, left.items(), strict=True):
+        spectrum = np.array([residual.spectrum[:, c] for c in range(3, 6)])
+        for edge in (residual.wheel[0], residual.wheel[2]):
             row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
         for c in range(3, 6):
-            row[0].plot(own.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
+            row[0].plot(residual.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
             row[1].semilogy(
-                ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
+                ORDERS, np.sqrt((residual.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
             )
-        row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
+        row[1].axvline(residual.turn[0], color="#888888", linewidth=0.8)
         row[0].set_title(body, loc="left")
         row[0].set_ylabel("[mm/s²]")
         row[1].set_ylabel("[m/s²]")

@@ -141,10 +141,10 @@ class Description(NamedTuple):
 def read_urdf(urdf: str | Path) -> Description:
     """Read a robot; its base is the link that hangs on no joint."""
     tree = ElementTree.parse(urdf).getroot()
-    found = {attribute(link, "name"): read_body(link) for link in tree.iterfind("link")}
+    bodies = {attribute(link, "name"): read_body(link) for link in tree.iterfind("link")}
     joints = tuple(_joint(element) for element in tree.iterfind("joint"))
-    base = next(name for name in found if name not in {joint.child for joint in joints})
-    return Description(base, tuple(found), {n: body for n, body in found.items() if body is not None}, joints)
+    base = next(name for name in bodies if name not in {joint.child for joint in joints})
+    return Description(base, tuple(bodies), {n: body for n, body in bodies.items() if body is not None}, joints)
 
 
 def _joint(element: ElementTree.Element) -> Joint:

@@ -216,16 +216,16 @@ class Information:
         widths : mapping of str to float, optional
             Widths of the bodies' priors in place of those of the drawings.
         """
-        designed = spreads(self.robot)
-        wanted = designed if widths is None else widths
+        drawn = spreads(self.robot)
+        chosen = drawn if widths is None else widths
         names = bodies(self.robot)
         size = self.jacobian.shape[-1]
         scale = np.ones(size)
-        scale[: PARAMETERS * len(names)] = np.repeat([wanted[name] / designed[name] for name in names], PARAMETERS)
+        scale[: PARAMETERS * len(names)] = np.repeat([chosen[name] / drawn[name] for name in names], PARAMETERS)
         rows = self.jacobian[:, : sensors.value[1]].reshape(-1, size) * scale
         exact = [PARAMETERS * i + k for i, name in enumerate(names) if name in known for k in range(PARAMETERS)]
         after = Knowledge((), np.zeros(0), np.zeros((0, size)), np.concatenate([rows, np.eye(size)])).fixing(exact)
-        return Known(self.robot, tuple(name for name in names if name not in known), wanted, after.coordinates)
+        return Known(self.robot, tuple(name for name in names if name not in known), chosen, after.coordinates)
 
 
 def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Information]:

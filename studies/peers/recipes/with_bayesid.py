@@ -14,6 +14,6 @@ def identify(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return the ten quantities of the base and their standard deviations."""
     study = bayesid.Study.load(folder / "study.toml")
     model = bayesid.load_model(study)
-    found = diagnose(model, bayesid.load_manoeuvres(study, model.robot), seed=0)
-    base = bayesid.identify(found.posterior, seed=0, start=found.start).bodies["base_link"]
+    diagnosis = diagnose(model, bayesid.load_manoeuvres(study, model.robot), seed=0)
+    base = bayesid.identify(diagnosis.posterior, seed=0, start=diagnosis.start).bodies["base_link"]
     return base.mean, base.sd

@@ -47,8 +47,8 @@ def identify(folder: Path) -> tuple[np.ndarray, np.ndarray]:
             columns.append(np.concatenate(parts).ravel())
         return [columns[0] if x.ndim == 1 else np.stack(columns, axis=1)], [], []
 
-    found, result = sysid.optimize(params, residual, verbose=False)
-    covariance, _ = sysid.calculate_intervals(residual(result.x, found)[0], result.jac)
+    optimum, result = sysid.optimize(params, residual, verbose=False)
+    covariance, _ = sysid.calculate_intervals(residual(result.x, optimum)[0], result.jac)
     theta = result.x[:10]
     slopes = approx_fprime(theta, _quantities)
     return _quantities(theta), np.sqrt(np.diag(slopes @ covariance[:10, :10] @ slopes.T))
@@ -62,8 +62,8 @@ def _change(spec: mujoco.MjSpec, body: sysid.Parameter) -> None:
 
 def _quantities(theta: np.ndarray) -> np.ndarray:
     """Return mass, centre of mass and inertia about it from the toolbox's ten parameters."""
-    found = sysid.model_modifier.pi_from_theta(theta)
-    mass, lever, matrix = found[0], found[1:4] / found[0], found[4:].reshape(3, 3)
+    inertial = sysid.model_modifier.pi_from_theta(theta)
+    mass, lever, matrix = inertial[0], inertial[1:4] / inertial[0], inertial[4:].reshape(3, 3)
     matrix = matrix - mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
     return np.concatenate([[mass], lever, matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 

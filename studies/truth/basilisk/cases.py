@@ -165,7 +165,7 @@ def _panel(draw: Generator, strength: float) -> BasiliskHidden:
 def _all(*builds: Build) -> Build:
     def build(draw: Generator, strength: float) -> BasiliskHidden:
         parts = [vars(one(draw, strength)) for one in builds]
-        return BasiliskHidden(**{key: part for found in parts for key, part in found.items() if part is not None})
+        return BasiliskHidden(**{key: part for of_build in parts for key, part in of_build.items() if part is not None})
 
     return build
 

@@ -42,7 +42,7 @@ BINS = np.fft.rfftfreq(96, INTERVAL)
 
 
 @dataclass(frozen=True)
-class LeftOver:
+class Residual:
     """What is left of all throws of one body."""
 
     names: tuple[str, ...]
@@ -91,13 +91,13 @@ def _turn(orders: Floats) -> tuple[float, Floats, Floats]:
     return float(ORDERS[place]), mean[place], mean[beside]
 
 
-def pole_pairs(left: Sequence[LeftOver]) -> int:
+def pole_pairs(left: Sequence[Residual]) -> int:
     """Return the number of pole pairs that the loudest line of some bodies says, were it the wheel's own turn."""
-    peaks = [own.peaks(3 + int(np.argmax(own.turn[1][3:]))) for own in left]
+    peaks = [residual.peaks(3 + int(np.argmax(residual.turn[1][3:]))) for residual in left]
     return round(POLE_PAIRS / float(np.median(np.concatenate(peaks))))
 
 
-def left_over(throws: Sequence[Throw], folder: Path) -> LeftOver:
+def residual_of(throws: Sequence[Throw], folder: Path) -> Residual:
     """Describe what the fitted throws of one body leave."""
     spectra, phases, squares, wheels, orders, runs = [], [], [], [], [], []
     for throw in throws:
@@ -117,7 +117,7 @@ def left_over(throws: Sequence[Throw], folder: Path) -> LeftOver:
     quiet = np.concatenate(
         [sensor.noise.sigma(INTERVAL) for sensor in throws[0].posterior.model.sensors if sensor.kind.mounted]
     )
-    return LeftOver(
+    return Residual(
         names=tuple(throw.name for throw in throws),
         spectrum=np.sqrt(np.mean(np.square(spectra), axis=0)),
         phase=np.sqrt(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)),
@@ -164,13 +164,13 @@ def _phase(share: Floats, before: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 def _amplitudes(time: Floats, residual: Floats) -> Floats:
     """Amplitudes at `BINS` by least squares on a sine of each frequency, since samples are missing: shape (f, 6)."""
-    found = []
+    amplitudes = []
     for frequency in BINS:
         angle = 2.0 * np.pi * frequency * time
         waves = np.column_stack([np.cos(angle), np.sin(angle)])
         share = np.linalg.lstsq(waves, residual, rcond=None)[0]
-        found.append(np.sqrt((share**2).sum(axis=0)))
-    return np.array(found)
+        amplitudes.append(np.sqrt((share**2).sum(axis=0)))
+    return np.array(amplitudes)
 
 
 def orders_of(recording: Recording, folder: Path) -> Floats:
@@ -194,26 +194,27 @@ def orders_of(recording: Recording, folder: Path) -> Floats:
 NEAR = 0.03
 
 
-def shaken_axis(left: LeftOver) -> int:
+def shaken_axis(left: Residual) -> int:
     """Return the channel of the accelerometer that the wheel shakes most."""
     return 3 + int(np.argmax(left.turn[1][3:]))
 
 
-def following(left: LeftOver, pairs: int) -> int:
+def following(left: Residual, pairs: int) -> int:
     """Return in how many throws the loudest line below order 1.5 is the turn of a wheel with some pairs of poles."""
     return int((np.abs(left.peaks(shaken_axis(left)) - POLE_PAIRS / pairs) < NEAR).sum())
 
 
-def shaking_words(left: Mapping[str, LeftOver], pairs: int) -> list[str]:
+def shaking_words(left: Mapping[str, Residual], pairs: int) -> list[str]:
     """Return sentences on what shakes the device and when, for bodies of the calibration and others."""
-    axes = {body: shaken_axis(own) for body, own in left.items()}
-    known = [own for body, own in left.items() if body in CALIBRATION]
-    others = [own for body, own in left.items() if body not in CALIBRATION]
+    axes = {body: shaken_axis(residual) for body, residual in left.items()}
+    known = [residual for body, residual in left.items() if body in CALIBRATION]
+    others = [residual for body, residual in left.items() if body not in CALIBRATION]
     counts = [
-        f"{sum(following(own, pairs) for own in of)} of {sum(len(own.names) for own in of)}" for of in (known, others)
+        f"{sum(following(residual, pairs) for residual in of)} of {sum(len(residual.names) for residual in of)}"
+        for of in (known, others)
     ]
-    running = [own.shaken[1, axes[body]] / own.phase[1, axes[body]] for body, own in left.items()]
-    loudest = [PHASES[int(np.nanargmax(own.phase[:, axes[body]]))] for body, own in left.items()]
+    running = [residual.shaken[1, axes[body]] / residual.phase[1, axes[body]] for body, residual in left.items()]
+    loudest = [PHASES[int(np.nanargmax(residual.phase[:, axes[body]]))] for body, residual in left.items()]
     most = max(set(loudest), key=loudest.count)
     shaken = (
         f"The wheel shakes the device: the raw accelerometer is loudest at {POLE_PAIRS}/{pairs} of the recorded "
