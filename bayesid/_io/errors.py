@@ -31,5 +31,13 @@ class InputError(ValueError):
         super().__init__(f"{message}. {remedy}" if remedy else message)
 
     def within(self, *, file: str | Path | None = None, place: str | None = None) -> InputError:
-        """Return the same error with the given file and place where it has none."""
+        """Return the same error with the given file and place where it has none.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            File in which the error is.
+        place : str, optional
+            Place in the file.
+        """
         return InputError(self.problem, file=self.file or file, place=self.place or place, remedy=self.remedy)

@@ -36,13 +36,25 @@ def complete_file(file: str | Path) -> Iterator[Path]:
 
 
 def write_text(file: str | Path, text: str) -> None:
-    """Write text as UTF-8, whole or not at all."""
+    """Write text as UTF-8, whole or not at all.
+
+    Parameters
+    ----------
+    file : str or Path
+    text : str
+    """
     with complete_file(file) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def write_json(file: str | Path, content: dict[str, Any]) -> None:
-    """Write JSON with arrays as lists and numbers that are not finite as null, whole or not at all."""
+    """Write JSON with arrays as lists and numbers that are not finite as null, whole or not at all.
+
+    Parameters
+    ----------
+    file : str or Path
+    content : dict of str to object
+    """
     write_text(file, json.dumps(_finite(content), indent=1, allow_nan=False))
 
 

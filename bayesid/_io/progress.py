@@ -29,7 +29,17 @@ def silent(fraction: float, text: str, /) -> None:
 
 
 def part_of(progress: Progress, start: float, end: float) -> Progress:
-    """Return the progress for a part of a computation, from one fraction of the whole to another."""
+    """Return the progress for a part of a computation, from one fraction of the whole to another.
+
+    Parameters
+    ----------
+    progress : Progress
+        Receiver of the fraction of the whole.
+    start : float
+        Fraction of the whole at which the part begins.
+    end : float
+        Fraction of the whole at which it ends.
+    """
     return lambda fraction, text: progress(start + (end - start) * fraction, text)
 
 
@@ -53,6 +63,16 @@ class PhaseClock:
         self._last = now
 
     def moves(self, phase: str, other: str, seconds: float) -> None:
-        """Write down that some of the time of a phase [s] was that of another."""
+        """Write down that some of the time of a phase [s] was that of another.
+
+        Parameters
+        ----------
+        phase : str
+            Phase that has the time so far.
+        other : str
+            Phase that gets it.
+        seconds : float
+            Time to move [s].
+        """
         self.seconds[phase] -= seconds
         self.seconds[other] = self.seconds.get(other, 0.0) + seconds

@@ -16,13 +16,30 @@ def joined(texts: Iterable[str]) -> str:
 
 
 def abridged(texts: Sequence[str], most: int = NAMED, separator: str = ", ") -> str:
-    """Return a list of texts that names the first few and counts the rest: ``a, b and 3 more``."""
+    """Return a list of texts that names the first few and counts the rest: ``a, b and 3 more``.
+
+    Parameters
+    ----------
+    texts : sequence of str
+    most : int
+        Number of texts that are named.
+    separator : str
+    """
     more = len(texts) - most
     return separator.join(texts[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def counted(number: int, noun: str, plural: str | None = None) -> str:
-    """Return a number with its noun, whose plural has an s unless stated: ``1 recording``, ``3 recordings``."""
+    """Return a number with its noun, whose plural has an s unless stated: ``1 recording``, ``3 recordings``.
+
+    Parameters
+    ----------
+    number : int
+    noun : str
+        Noun in the singular.
+    plural : str, optional
+        Irregular plural.
+    """
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 

@@ -15,7 +15,7 @@ from bayesid.app.options import Output, Samples, Seed
 if TYPE_CHECKING:
     from bayesid.diagnosis import Diagnosis
 
-__all__ = ["copy_demonstration", "run"]
+__all__ = ["run"]
 
 
 def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0) -> Iterator[str]:
@@ -23,7 +23,7 @@ def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
 
-    answer = copy_demonstration(output / "study")
+    answer = _copy_demonstration(output / "study")
     yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
     result: list[Diagnosis] = []
     study = Study.load(output / "study" / "study.toml")
@@ -34,7 +34,7 @@ def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4
         yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
 
 
-def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
+def _copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
     """Copy the shipped study into a folder.
 
     Returns

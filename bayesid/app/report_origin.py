@@ -55,7 +55,16 @@ def _typed(value: str | float | Path) -> str:
 
 
 def origin_text(files: Sequence[Path], words: Sequence[str], seed: int | None) -> str:
-    """Return the hashes of files, the version, the seed, if there is one, and the words of a command."""
+    """Return the hashes of files, the version, the seed, if there is one, and the words of a command.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files whose hashes are stated.
+    words : sequence of str
+        Command as it is typed.
+    seed : int or None
+    """
     hashes = ", ".join(f"{file.name} {file_key(file)[:DIGITS]}" for file in files)
     sown = "" if seed is None else f", seed {seed}"
     return f"SHA-256: {hashes}. bayesid {version('bayesid')}{sown}, command: {shlex.join(words)}"

@@ -20,7 +20,7 @@ from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
 from bayesid.robot.robot import Joint, Robot
 
-__all__ = ["CHECK", "channel_noise", "draft_study", "open_places", "vector_noise"]
+__all__ = ["CHECK", "channel_noise", "draft_study", "open_places"]
 
 CHECK = "# please check"
 """Mark of every value that recordings cannot tell."""
@@ -163,7 +163,7 @@ def _vector_sensor(recordings: Sequence[Recording], family: str) -> str:
     holding = _holding(recordings, family)
     if not holding:
         return ""
-    sigma = vector_noise(holding, family)
+    sigma = _vector_noise(holding, family)
     source = "estimated from the recordings" if sigma else "a guess, as the readings show no noise"
     shown = _one_or_each(sigma or (UNSEEN[family],) * 3)
     lines = [f"[sensors.{family}]", _unsure(f"sigma = {shown}", f"{UNITS[family]}, per sample, {source}")]
@@ -206,7 +206,7 @@ def _recording(recording: Recording, folder: Path) -> str:
     if "attitude.x" in recording.channels:
         time, quaternion = recording.vector("attitude", ("x", "y", "z", "w"))
         first = ", ".join(f"{value:.9g}" for value in quaternion[0])
-        sigma = max(vector_noise([recording], "attitude") or (UNSEEN["attitude"],))
+        sigma = max(_vector_noise([recording], "attitude") or (UNSEEN["attitude"],))
         lines.append(f"attitude = [{first}]")
         lines.append(_unsure(f"attitude_sigma = {sigma:.1e}", f"rad; attitude is the sample at {time[0]:.3g} s"))
     else:
@@ -255,12 +255,18 @@ def channel_noise(recordings: Sequence[Recording], column: str) -> float | None:
     High differences of the samples leave noise and no motion, and the median over them leaves out where the motion is
     rough; where the samples are too uneven for differences, the likelihood of a smoothing spline says how noisy they
     are.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    column : str
+        Name of the channel, such as ``position.joint1``.
     """
     sigmas = [_noise(*recording.series(column)) for recording in recordings if column in recording.channels]
     return _median(sigmas)
 
 
-def vector_noise(recordings: Sequence[Recording], family: str) -> tuple[float, float, float] | None:
+def _vector_noise(recordings: Sequence[Recording], family: str) -> tuple[float, float, float] | None:
     """Return the standard deviations per sample of the three axes of a sensor, None if one of them shows no noise.
 
     Those of an attitude are small rotations in base axes [rad].

@@ -95,6 +95,12 @@ def load_loop_problem(study: Study) -> Problem:
 def separating(study: Study, rivals: tuple[str, str]) -> Study:
     """Return a study whose design tells two effects apart, whatever its section ``[design]`` says of criteria.
 
+    Parameters
+    ----------
+    study : Study
+    rivals : tuple of two str
+        Labels of the effects.
+
     Raises
     ------
     InputError
@@ -195,6 +201,15 @@ STARTS, ITERATIONS = 2, 60  # effort of the search, a small part of that of ``ba
 def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progress) -> Design:
     """Design a manoeuvre that tells two effects apart within the limits of the study, with little effort.
 
+    Parameters
+    ----------
+    study : Study
+    rivals : tuple of two str
+        Labels of the effects.
+    seed : int
+        Seed of the search.
+    progress : Progress
+
     Raises
     ------
     InputError
@@ -208,7 +223,15 @@ def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progres
 
 
 def write_motion(design: Design, file: Path) -> None:
-    """Write the positions of the joints along a manoeuvre as a recording."""
+    """Write the positions of the joints along a manoeuvre as a recording.
+
+    Parameters
+    ----------
+    design : Design
+        Designed manoeuvre.
+    file : Path
+        Recording to write, as CSV.
+    """
     recording = design.manoeuvre.recording
     joints = {key: values for key, values in recording.channels.items() if key.startswith("position.")}
     Recording(design.name, None, recording.time, joints).write(file)

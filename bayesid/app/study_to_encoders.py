@@ -23,6 +23,11 @@ JointNoise = dict[int, dict[str, float | None]]
 def encoder_noise(study: Study, robot: Robot) -> JointNoise:
     """Return the noise per sample of all joints of a robot.
 
+    Parameters
+    ----------
+    study : Study
+    robot : Robot
+
     Raises
     ------
     InputError
@@ -51,6 +56,15 @@ def assume_missing(noise: JointNoise) -> tuple[JointNoise, list[str]]:
 
 def named_joint(name: str, robot: Robot, place: str, file: Path | None = None) -> int:
     """Return the index in `Robot.joints` of the joint that a study names at a place of its file.
+
+    Parameters
+    ----------
+    name : str
+    robot : Robot
+    place : str
+        Place in the study file, for the message.
+    file : Path, optional
+        Study file, for the message.
 
     Raises
     ------

@@ -96,7 +96,13 @@ def _count(manoeuvres: Sequence[Manoeuvre]) -> str:
 
 
 def lacking_sensors(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:
-    """Return the declared sensors that some recording does not hold."""
+    """Return the declared sensors that some recording does not hold.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    """
     lacking = [
         sensor.kind.value
         for sensor in model.sensors
@@ -114,6 +120,12 @@ def planned_manoeuvres(
 
     A plan has no noise from which that of the encoders could be estimated. Where the study does not give it either it
     is assumed, for the joints of the list.
+
+    Parameters
+    ----------
+    study : Study
+    model : Model
+    manoeuvres : sequence of Manoeuvre
     """
     robot, (noise, assumed) = model.robot, assume_missing(encoder_noise(study, model.robot))
     planned = []

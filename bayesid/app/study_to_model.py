@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 __all__ = [
     "cause_prior",
     "criteria_of",
-    "load_manoeuvre",
     "load_manoeuvres",
     "load_model",
     "load_posterior",
@@ -175,11 +174,17 @@ def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tup
 
 
 def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
-    """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion."""
+    """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion.
+
+    Parameters
+    ----------
+    study : Study
+    robot : Robot
+    """
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     _check_latitudes(study)
-    manoeuvres = [load_manoeuvre(study, section, robot) for section in study.recordings]
+    manoeuvres = [_load_manoeuvre(study, section, robot) for section in study.recordings]
     _refuse_copies(study, manoeuvres)
     if not study.model.noise:
         return manoeuvres
@@ -215,7 +220,7 @@ def _check_latitudes(study: Study) -> None:
             )
 
 
-def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
+def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = unwrapped(Recording.read(section.file), robot)
     refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
@@ -315,10 +320,10 @@ def _effects(study: Study) -> tuple[Effect, ...]:
         if label not in known:
             problem = f"prior of an effect that is not in the model: {label!r}"
             raise InputError(problem, place="model.priors", remedy=f"Effects in the model: {', '.join(known)}")
-    return tuple(with_prior(effect, study.model.priors.get(effect.label, {})) for effect in effects)
+    return tuple(_with_prior(effect, study.model.priors.get(effect.label, {})) for effect in effects)
 
 
-def with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
+def _with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
     """Return the effect with other prior standard deviations of the parameters that ``sigma`` names."""
     keys = [parameter.name for parameter in effect.parameters]
     for key in sigma:

@@ -135,6 +135,12 @@ def _joint_family(topic: StampedTopic, names: Sequence[str], field: str, family:
 def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
     """Return angular velocity and, if wanted, acceleration of an IMU, unless it says that it does not measure them.
 
+    Parameters
+    ----------
+    topic : StampedTopic
+    accel : bool
+        Whether the acceleration is wanted.
+
     Raises
     ------
     InputError

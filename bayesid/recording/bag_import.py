@@ -33,7 +33,7 @@ from bayesid.recording.bag_channels import (
 from bayesid.recording.recording import Recording
 from bayesid.recording.ros_bag import StampedTopic, read_topics
 
-__all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "TimeWindow", "import_bag", "refuse_mixed_clocks"]
+__all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "TimeWindow", "import_bag"]
 
 # share of a topic's messages that are left out without asking
 MOST_FAULTY = 0.02
@@ -74,7 +74,17 @@ class TimeWindow:
 
     @staticmethod
     def of_options(start: float, end: float | None, duration: float | None) -> TimeWindow:
-        """Return the window from a start to an end or of a duration [s], of which one may be given."""
+        """Return the window from a start to an end or of a duration [s], of which one may be given.
+
+        Parameters
+        ----------
+        start : float
+            First instant, from the first stamp [s].
+        end : float or None
+            Last instant, from the first stamp [s].
+        duration : float or None
+            Length from the start [s].
+        """
         if end is not None and duration is not None:
             raise InputError("both --end and --duration are given", remedy="Give one of them")
         return TimeWindow(start, start + duration if duration is not None else end)
@@ -180,6 +190,13 @@ class ImportedBag:
 def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
     """Return the recording of a bag.
 
+    Parameters
+    ----------
+    bag : Path
+        File of ROS 1, or folder of ROS 2.
+    selected : BagTopics
+        Topics to read, and what of them.
+
     Raises
     ------
     InputError
@@ -211,7 +228,7 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
         ),
         *([] if selected.attitude is None else [(sound(selected.attitude, attitude_fault), attitude_channels)]),
     ]
-    refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
+    _refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
     for topic, channels_of in base:
         inside = _during(arms[0], topic, known)
         read.append((inside, channels_of(inside), inside.frame()))
@@ -260,7 +277,7 @@ def _described(topic: StampedTopic, channels: Channels, frame: str, messages: in
     )
 
 
-def refuse_mixed_clocks(topics: Sequence[StampedTopic]) -> None:
+def _refuse_mixed_clocks(topics: Sequence[StampedTopic]) -> None:
     """Refuse topics whose stamps come from different clocks.
 
     All messages of a bag arrive on one clock. By how much stamps precede the arrival is a small delay, or, where the

@@ -136,7 +136,15 @@ class IntegratedProcess:
         return process, logdet
 
     def covariance(self, intensity: float, place: int) -> Floats:
-        """Return the covariance of the increments of one step, (order, order)."""
+        """Return the covariance of the increments of one step, (order, order).
+
+        Parameters
+        ----------
+        intensity : float
+            Standard deviation of the white noise that is integrated, in scaled time.
+        place : int
+            Index of the step.
+        """
         usual = _unit(self.order) * self._step[place] ** _exponent(self.order) * intensity**2 * self._roughness[place]
         return np.asarray(usual + self._added.get(place, 0.0))
 

@@ -149,6 +149,13 @@ class MeasuredMotion:
         """Refuse a recording whose joints are not sampled from about time 0 to about the last of its sensors' samples.
 
         A smoothing spline says nothing far beyond its samples, except where they are constant.
+
+        Parameters
+        ----------
+        end : float
+            Time of the last sample of the other sensors [s].
+        file : Path or str
+            Recording, for the message.
         """
         for name, joint in zip(self.names, self.joints, strict=True):
             first, last, margin = joint.nodes[0], joint.nodes[-1], EXTENDED * joint.scale
@@ -166,7 +173,15 @@ class MeasuredMotion:
         return replace(self, joints=tuple(joint.with_noise(factor) for joint in self.joints))
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
-        """Return the covariances of `SmoothedJoint.lag_covariance` for all joints, (joints, lags + 1, T, 3, 3)."""
+        """Return the covariances of `SmoothedJoint.lag_covariance` for all joints, (joints, lags + 1, T, 3, 3).
+
+        Parameters
+        ----------
+        time : (T,) array
+            Times [s].
+        lags : int
+            Largest distance in samples.
+        """
         if not self.joints:
             return np.zeros((0, lags + 1, len(time), 3, 3))
         return np.stack([joint.lag_covariance(time, lags) for joint in self.joints])
@@ -188,7 +203,13 @@ def _samples(
 
 
 def check_joints(recording: Recording, robot: Robot) -> None:
-    """Refuse a recording that lacks a joint of the robot or holds one that the robot lacks."""
+    """Refuse a recording that lacks a joint of the robot or holds one that the robot lacks.
+
+    Parameters
+    ----------
+    recording : Recording
+    robot : Robot
+    """
     known = [joint.name for joint in robot.joints]
     missing = [name for name in known if not {f"position.{name}", f"velocity.{name}"} & set(recording.channels)]
     strangers = [name for name in recording.joints if name not in known]
@@ -203,6 +224,14 @@ def check_joints(recording: Recording, robot: Robot) -> None:
 
 
 def sample_joints(motion: Motion, robot: Robot, time: Sequence[float] | Floats) -> dict[str, Floats]:
-    """Return the channels ``position.<joint>`` of a recording that samples a motion at the times (T,)."""
+    """Return the channels ``position.<joint>`` of a recording that samples a motion at the times (T,).
+
+    Parameters
+    ----------
+    motion : Motion
+    robot : Robot
+    time : (T,) array
+        Times [s].
+    """
     position = motion.evaluate(np.asarray(time, dtype=float)).position
     return {f"position.{joint.name}": position[:, index] for index, joint in enumerate(robot.joints)}

@@ -26,6 +26,11 @@ RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the 
 def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
     """Refuse what degrees or arcseconds make of radians: joints far outside their limits, and a base that whirls.
 
+    Parameters
+    ----------
+    recording : Recording
+    robot : Robot
+
     Raises
     ------
     InputError

@@ -464,6 +464,12 @@ VECTOR_FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(_VECTOR_FAMILI
 def declare_family(name: str, axes: tuple[str, ...]) -> None:
     """Make columns ``name.axis`` known to recordings, for a sensor that the package lacks.
 
+    Parameters
+    ----------
+    name : str
+    axes : tuple of str
+        Names of the columns after the dot.
+
     Raises
     ------
     InputError

@@ -60,7 +60,15 @@ class StampedTopic:
     reordered: int = 0
 
     def error(self, problem: str, *, message: int | None = None, remedy: str) -> InputError:
-        """Return an error in the topic, or in one of its messages, counted from 0."""
+        """Return an error in the topic, or in one of its messages, counted from 0.
+
+        Parameters
+        ----------
+        problem : str
+        message : int, optional
+            Number of the message, from 0.
+        remedy : str
+        """
         place = f"topic {self.name}"
         if message is not None:
             place = (

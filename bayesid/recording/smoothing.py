@@ -90,6 +90,12 @@ class SmoothedJoint:
         """Smooth the samples anew with other jumps of the process, of one of some orders.
 
         Where the roughness has been found, the order stays that for which it was found.
+
+        Parameters
+        ----------
+        jumps : sequence of Jump
+        orders : sequence of int
+            Orders of the derivative that may be white noise.
         """
         return smooth(list(self.series), self.start, jumps, self._orders(orders), self.roughness)
 

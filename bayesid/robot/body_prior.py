@@ -56,7 +56,14 @@ class BodyPrior:
 
 
 def check_mixing(mixing: Mixing, bodies: int) -> None:
-    """Reject a factor that is not lower-triangular of full rank or does not fit the number of bodies."""
+    """Reject a factor that is not lower-triangular of full rank or does not fit the number of bodies.
+
+    Parameters
+    ----------
+    mixing : Mixing
+    bodies : int
+        Number of bodies of the prior.
+    """
     count = 10 * bodies
     square = len(mixing) == count and all(len(row) == count for row in mixing)
     factor = np.array(mixing) if square else np.zeros((0, 0))
@@ -68,11 +75,25 @@ def check_mixing(mixing: Mixing, bodies: int) -> None:
 
 
 def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
-    """Return the coordinates of a body that are standard-normal under its prior, shape (10,)."""
+    """Return the coordinates of a body that are standard-normal under its prior, shape (10,).
+
+    Parameters
+    ----------
+    body : BodyPrior
+    inertial : InertialParameters
+    """
     return relative_coordinates(body.centre, inertial) / body.spread
 
 
 def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
-    """Draw a body from the log-Cholesky prior about a centre."""
+    """Draw a body from the log-Cholesky prior about a centre.
+
+    Parameters
+    ----------
+    centre : InertialParameters
+    spread : float
+        Standard deviation of the log-Cholesky coordinates.
+    rng : numpy.random.Generator
+    """
     vector = log_cholesky_vector(centre, on_device(spread * rng.normal(size=10)))
     return InertialParameters.from_vector(np.asarray(vector))

@@ -32,7 +32,6 @@ __all__ = [
     "composite_rows",
     "link_table",
     "row_sensitivity",
-    "rows_of_moments",
     "screws",
 ]
 
@@ -77,10 +76,10 @@ def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -
     left = pose[:, None] @ bodies
     xp = namespace(left)
     composite, flow, surge = (left @ xp.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
-    return rows_of_moments(composite, flow, surge)
+    return _rows_of_moments(composite, flow, surge)
 
 
-def rows_of_moments(composite: Traceable, flow: Traceable, surge: Traceable) -> Floats:
+def _rows_of_moments(composite: Traceable, flow: Traceable, surge: Traceable) -> Floats:
     """Return the rows (..., 28) of the sums ``P``, ``S`` and ``Q``, each of shape (..., 4, 4)."""
     xp = namespace(composite)
     spin, spin_rate = (
@@ -134,7 +133,14 @@ class Screws(NamedTuple):
 
 
 def screws(robot: Robot, motion: Kinematics) -> Screws:
-    """Return the screws of all joints of a robot, which must have joints."""
+    """Return the screws of all joints of a robot, which must have joints.
+
+    Parameters
+    ----------
+    robot : Robot
+    motion : Kinematics
+        Motion of the joint frames at T instants.
+    """
     axes = jnp.asarray(hat(np.stack([joint_twist(robot, index) for index in range(len(robot.joints))])))
     pose, rate, acceleration = (jnp.asarray(part) for part in motion)
     turn = jnp.swapaxes(pose[..., :3, :3], -1, -2)
@@ -182,13 +188,13 @@ def row_sensitivity(robot: Robot, motion: Kinematics, joint_screws: Screws, bodi
     pushed = composite @ turned
     slower = composite @ turned_rate + flow @ turned
     nothing = jnp.zeros_like(pushed)
-    by_position = rows_of_moments(
+    by_position = _rows_of_moments(
         screw @ composite + pushed,
         screw @ flow + slower,
         screw @ surge + composite @ turned_acceleration + 2.0 * flow @ turned_rate + surge @ turned,
     )
-    by_velocity = rows_of_moments(nothing, pushed, 2.0 * slower)
-    by_acceleration = rows_of_moments(nothing, nothing, pushed)
+    by_velocity = _rows_of_moments(nothing, pushed, 2.0 * slower)
+    by_acceleration = _rows_of_moments(nothing, nothing, pushed)
     return jnp.stack([by_position, by_velocity, by_acceleration])
 
 

@@ -68,7 +68,14 @@ def kinematics(robot: Robot, state: JointState) -> Kinematics:
 
 
 def configuration(robot: Robot, position: Floats) -> Floats:
-    """Return Pinocchio's configuration of joint positions (joints,) with the base at the origin."""
+    """Return Pinocchio's configuration of joint positions (joints,) with the base at the origin.
+
+    Parameters
+    ----------
+    robot : Robot
+    position : (joints,) array
+        Joint positions [rad or m].
+    """
     q = pin.neutral(robot.model)
     for index, value in enumerate(position):
         joint = robot.model.joints[index + 2]
@@ -80,7 +87,14 @@ def configuration(robot: Robot, position: Floats) -> Floats:
 
 
 def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats]:
-    """Return the pose of a joint's frame with two derivatives, each (T, 4, 4); a negative index stands for the base."""
+    """Return the pose of a joint's frame with two derivatives, each (T, 4, 4); a negative index stands for the base.
+
+    Parameters
+    ----------
+    motion : Kinematics
+    joint : int
+        Index into `Robot.joints`.
+    """
     if joint < 0:
         still = np.zeros((len(motion.pose), 4, 4))
         return still + np.eye(4), still, still
@@ -88,7 +102,14 @@ def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats
 
 
 def joint_twist(robot: Robot, joint: int) -> Floats:
-    """Return the velocity of a joint's frame at unit speed of the joint, linear part first, in its axes, shape (6,)."""
+    """Return the velocity of a joint's frame at unit speed of the joint, linear part first, in its axes, shape (6,).
+
+    Parameters
+    ----------
+    robot : Robot
+    joint : int
+        Index into `Robot.joints`.
+    """
     model = robot.model.joints[joint + 2]
     data = model.createData()
     model.calc(data, pin.neutral(robot.model), np.zeros(robot.model.nv))
@@ -128,6 +149,12 @@ class Tip:
     def of(cls, robot: Robot, name: str | None = None) -> Tip:
         """Return the frame of a name, by default the last frame of the last link.
 
+        Parameters
+        ----------
+        robot : Robot
+        name : str, optional
+            Frame, such as a link.
+
         Raises
         ------
         InputError
@@ -148,6 +175,12 @@ class Tip:
         """Return the pose of the frame in the base and its derivative, each (T, 4, 4), for joint states at T instants.
 
         Arrays are NumPy's, or JAX's where the joint states are.
+
+        Parameters
+        ----------
+        robot : Robot
+        state : JointState
+            Joint states, each of shape (T, joints).
         """
         pose, rate, _ = joint_motion(kinematics(robot, state), self.joint)
         return pose @ self.placement, rate @ self.placement

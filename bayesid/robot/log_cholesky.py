@@ -61,13 +61,28 @@ def log_cholesky_factor(coordinates: Array) -> Array:
 
 
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
-    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
+    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,).
+
+    Parameters
+    ----------
+    centre : InertialParameters
+    coordinates : (10,) array
+        Log-Cholesky coordinates, without unit.
+    """
     return vector_from_factor(on_device(upper_cholesky(centre.pseudo_inertia)), coordinates)
 
 
 @jax.jit  # traced once for all bodies
 def vector_from_factor(centre: Array, coordinates: Array) -> Array:
-    """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`)."""
+    """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`).
+
+    Parameters
+    ----------
+    centre : (4, 4) array
+        Upper factor of the centre's pseudo-inertia.
+    coordinates : (10,) array
+        Log-Cholesky coordinates, without unit.
+    """
     factor = centre @ log_cholesky_factor(coordinates)
     return parameters_from_pseudo_inertia(factor @ factor.T)
 
@@ -131,7 +146,13 @@ SLOPE.setflags(write=False)
 
 
 def relative_coordinates(centre: InertialParameters, inertial: InertialParameters) -> Floats:
-    """Return the log-Cholesky coordinates of a body relative to a centre, shape (10,)."""
+    """Return the log-Cholesky coordinates of a body relative to a centre, shape (10,).
+
+    Parameters
+    ----------
+    centre : InertialParameters
+    inertial : InertialParameters
+    """
     return log_cholesky_coordinates(centre.pseudo_inertia, inertial.pseudo_inertia[None])[0]
 
 

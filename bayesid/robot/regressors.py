@@ -157,7 +157,14 @@ def torque_regressor(
 
 
 def joint_axes(robot: Robot, motion: Kinematics) -> Floats:
-    """Return the twist at the base origin of the links that each joint carries at unit speed, (T, joints, 6)."""
+    """Return the twist at the base origin of the links that each joint carries at unit speed, (T, joints, 6).
+
+    Parameters
+    ----------
+    robot : Robot
+    motion : Kinematics
+        Motion of the joint frames at T instants.
+    """
     xp = namespace(motion.pose)
     axes = []
     for index in range(len(robot.joints)):
@@ -169,7 +176,14 @@ def joint_axes(robot: Robot, motion: Kinematics) -> Floats:
 
 
 def carried_bodies(robot: Robot, bodies: Sequence[str]) -> Floats:
-    """Return 1 where a joint carries a body and 0 elsewhere, shape (joints, bodies)."""
+    """Return 1 where a joint carries a body and 0 elsewhere, shape (joints, bodies).
+
+    Parameters
+    ----------
+    robot : Robot
+    bodies : sequence of str
+        Names of links or loads.
+    """
     carried = np.zeros((len(robot.joints), len(bodies)))
     for column, name in enumerate(bodies):
         carried[robot.chain(robot.link(name).joint), column] = 1.0

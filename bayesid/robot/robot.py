@@ -203,7 +203,14 @@ class Robot:
         return chain
 
     def with_inertial(self, name: str, inertial: InertialParameters) -> Robot:
-        """Return the robot with other inertial parameters of one link or load."""
+        """Return the robot with other inertial parameters of one link or load.
+
+        Parameters
+        ----------
+        name : str
+            Link or load.
+        inertial : InertialParameters
+        """
         links = dict(self.links)
         links[name] = replace(self.link(name), inertial=inertial)
         return replace(self, links=MappingProxyType(links))
@@ -219,7 +226,16 @@ class Robot:
         return replace(self, links=MappingProxyType(links), loads=(*self.loads, load.name))
 
     def perturbed(self, name: str, relative: float, rng: np.random.Generator) -> Robot:
-        """Return the robot with one link drawn from its log-Cholesky prior of the given relative width."""
+        """Return the robot with one link drawn from its log-Cholesky prior of the given relative width.
+
+        Parameters
+        ----------
+        name : str
+            Link or load.
+        relative : float
+            Standard deviation of the log-Cholesky coordinates.
+        rng : numpy.random.Generator
+        """
         return self.with_inertial(name, draw_inertial(self.link(name).inertial, relative, rng))
 
     def joint_index(self, name: str) -> int:

@@ -86,6 +86,12 @@ def beyond_joint(robot: Robot, joint: int) -> BeyondJoint:
     """Return what the joint of an index into `Robot.joints` carries.
 
     A joint that carries no mass is said to carry a gram within a centimetre, so that bounds stay above zero.
+
+    Parameters
+    ----------
+    robot : Robot
+    joint : int
+        Index into `Robot.joints`.
     """
     carried = {name: link for name, link in robot.links.items() if joint in robot.chain(link.joint)}
     mass = sum(link.inertial.mass for link in carried.values())
@@ -107,7 +113,14 @@ def half_edges(inertial: InertialParameters) -> Floats:
 
 
 def link_radius(robot: Robot, name: str) -> float:
-    """Return the largest distance of a link's matter, and of the frames that hang on it, from its origin [m]."""
+    """Return the largest distance of a link's matter, and of the frames that hang on it, from its origin [m].
+
+    Parameters
+    ----------
+    robot : Robot
+    name : str
+        Link.
+    """
     link = robot.link(name)
     inverse = np.linalg.inv(link.placement)
     frames = [other.placement for other in robot.links.values() if other.joint == link.joint]

@@ -185,7 +185,14 @@ class EncoderSensor(Section):
     acceleration_sigma: PerName | None = None
 
     def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
-        """Return the noise per sample of one joint's position, velocity or acceleration, None if not given."""
+        """Return the noise per sample of one joint's position, velocity or acceleration, None if not given.
+
+        Parameters
+        ----------
+        family : {"position", "velocity", "acceleration"}
+        joint : str
+            Name of the joint.
+        """
         level = {"position": self.sigma, "velocity": self.velocity_sigma, "acceleration": self.acceleration_sigma}
         given = level[family]
         return given.get(joint) if isinstance(given, Mapping) else given

@@ -89,7 +89,15 @@ class Study(Section):
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any], file: Path | None = None) -> Study:
-        """Check the parsed content of a study file; without a file its paths stay as they are."""
+        """Check the parsed content of a study file; without a file its paths stay as they are.
+
+        Parameters
+        ----------
+        data : mapping of str to object
+            Content of the file, as a TOML reader returns it.
+        file : Path, optional
+            Study file, against whose folder paths are resolved.
+        """
         try:
             study = cls.model_validate(data, context={"folder": None if file is None else file.parent})
         except ValidationError as error:

@@ -36,7 +36,14 @@ if TYPE_CHECKING:
 
 
 def check_extended(body: BodySection, place: str) -> None:
-    """Reject a point, rod or plate as the centre of a prior."""
+    """Reject a point, rod or plate as the centre of a prior.
+
+    Parameters
+    ----------
+    body : BodySection
+    place : str
+        Place in the study file, for the message.
+    """
     if not body.parameters.is_extended:
         raise InputError(
             "the body is a point, a rod or a plate, about which no relative prior can be centred",

@@ -30,13 +30,28 @@ _WANTED = {
 
 
 def suggest(name: str, known: Sequence[str]) -> str | None:
-    """Return a hint at the most similar known name, None if there is no similar one."""
+    """Return a hint at the most similar known name, None if there is no similar one.
+
+    Parameters
+    ----------
+    name : str
+        Unknown name.
+    known : sequence of str
+        Names that exist.
+    """
     near = difflib.get_close_matches(name, known, n=1)
     return f"Did you mean '{near[0]}'?" if near else None
 
 
 def syntax_error(error: tomllib.TOMLDecodeError, file: Path) -> InputError:
-    """Return the parser's message as an error whose place is the line."""
+    """Return the parser's message as an error whose place is the line.
+
+    Parameters
+    ----------
+    error : tomllib.TOMLDecodeError
+    file : Path
+        Study file.
+    """
     text = str(error)
     match = re.search(r"\s*\(at (line \d+, column \d+|end of document)\)", text)
     place = match.group(1) if match else None
@@ -49,6 +64,14 @@ def explain(error: ValidationError, data: Mapping[str, Any], study: type[Section
 
     A misspelt key comes first, because it is usually the reason why another key is missing, then what stands first in
     the file.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+    data : mapping of str to object
+        Content of the study file.
+    study : type of Section
+        Section of the whole file.
     """
     errors = error.errors(include_url=False)
     faults = sorted(errors, key=lambda fault: (fault["type"] != "extra_forbidden", _order(fault, data)))

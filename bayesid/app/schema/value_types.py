@@ -37,7 +37,15 @@ def _numbers(value: Any) -> Iterable[float]:
 
 
 def no_more_than(limit: float, remedy: str) -> AfterValidator:
-    """Return a validator that rejects magnitudes so large that only a wrong unit explains them."""
+    """Return a validator that rejects magnitudes so large that only a wrong unit explains them.
+
+    Parameters
+    ----------
+    limit : float
+        Largest magnitude.
+    remedy : str
+        Remedy in the message.
+    """
 
     def check(value: Any) -> Any:
         largest = max(map(abs, _numbers(value)), default=0.0)
@@ -49,7 +57,15 @@ def no_more_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def no_less_than(limit: float, remedy: str) -> AfterValidator:
-    """Return a validator that rejects values so small that only a wrong unit explains them."""
+    """Return a validator that rejects values so small that only a wrong unit explains them.
+
+    Parameters
+    ----------
+    limit : float
+        Smallest value.
+    remedy : str
+        Remedy in the message.
+    """
 
     def check(value: float) -> float:
         if value < limit:
@@ -60,7 +76,15 @@ def no_less_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
-    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one positive for all."""
+    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one positive for all.
+
+    Parameters
+    ----------
+    size : int
+        Number of elements.
+    or_number : bool
+        Whether one positive number may stand for all.
+    """
 
     def check(value: Any) -> Any:
         if or_number and isinstance(value, (int, float)) and not isinstance(value, bool):
