@@ -15,8 +15,6 @@ from typing import Any, NamedTuple
 from bayesid.report import Document
 from studies.common.study import Goal, Verdict
 
-__all__ = ["BESIDE", "SUBJECTS", "judged", "write_validation"]
-
 
 @dataclass(frozen=True)
 class Subject:

@@ -37,20 +37,7 @@ from studies.base_body import paper
 from studies.common.ets7 import ACCEL, BASE, ENCODER, INTERVAL, TIP_RATE, TIP_SPEED, ets7, excitation, tip_speed
 from studies.common.flight import smoothed
 from studies.common.models import ARM_SPREAD, base_model
-from studies.common.quantities import MASS, MOMENTS
-
-__all__ = [
-    "CLAIM",
-    "GRADES",
-    "POOR",
-    "BaseBody",
-    "Information",
-    "NoiseFree",
-    "Reading",
-    "heavy_arm",
-    "limits_broken",
-    "run",
-]
+from studies.common.quantities import MASS, MOMENTS, body_of
 
 # excitation that hardly turns the base about z, since joint 1, which turns about z, almost rests [rad]. Nelder-Mead
 # sought the smallest rate about z relative to the smaller of the other two, within the paper's joint limits, from the
@@ -127,7 +114,7 @@ def guess_model(robot: Robot | None = None, *, gradient: bool = True, rate_sigma
     return base_model(
         {SensorKind.RATE: WEIGHT, SensorKind.ACCEL: WEIGHT},
         robot=robot,
-        centre=paper.body(paper.GUESS),
+        centre=body_of(paper.GUESS),
         gradient=gradient,
         bias=0.0,
         rate_sigma=rate_sigma,
@@ -137,7 +124,7 @@ def guess_model(robot: Robot | None = None, *, gradient: bool = True, rate_sigma
 def simulated(model: Model, motions: Sequence[Excitation]) -> list[Manoeuvre]:
     """Return manoeuvres with noise-free recordings of the true base, simulated with `TRUTH_STEP`."""
     simulator = Posterior.of(model, [planned(model, motion) for motion in motions], step=TRUTH_STEP)
-    truth = simulator.unknowns.coordinates([paper.body(paper.TRUTH)])
+    truth = simulator.unknowns.coordinates([body_of(paper.TRUTH)])
     recordings = simulate_recordings(simulator, z=truth)
     return [replace(plan, recording=made) for plan, made in zip(simulator.manoeuvres, recordings, strict=True)]
 
@@ -201,7 +188,7 @@ class Information:
     @classmethod
     def of(cls, motion: Excitation, step: float = STEP) -> Information:
         """Compute the information of a manoeuvre with an integration step [s]."""
-        model = base_model(dict.fromkeys(KINDS, UNIT), centre=paper.body(paper.TRUTH), arm_spread=ARM_SPREAD)
+        model = base_model(dict.fromkeys(KINDS, UNIT), centre=body_of(paper.TRUTH), arm_spread=ARM_SPREAD)
         manoeuvre = replace(planned(model, motion), attitude_sigma=STAR)
         simulator = Posterior.of(model, [manoeuvre], step=step, flat_prior=True)
         z = np.zeros(simulator.size)
@@ -217,8 +204,7 @@ class Information:
 
         Parameters
         ----------
-        sigma : mapping of SensorKind to float
-            Standard deviation per sample of the sensors used.
+        sigma : mapping of SensorKind to float; standard deviation per sample of the sensors used
         known : collection of str
             Groups of unknowns that are known exactly: `ARM`, `INITIAL_RATE`, `TILT`, `ACCEL_BIAS`.
         """
@@ -298,7 +284,7 @@ def _model(accel: float, centre: InertialParameters, arm_spread: float) -> Model
 def _planned(seed: int) -> Manoeuvre:
     """Return the paper's manoeuvre with joints that were recorded with noise and smoothed."""
     rng, motion, robot = np.random.default_rng(seed), excitation(paper.EXCITATION), ets7()
-    blank = planned(_model(ACCEL, paper.body(paper.TRUTH), 0.0), motion).recording
+    blank = planned(_model(ACCEL, body_of(paper.TRUTH), 0.0), motion).recording
     joints = sample_joints(motion, robot, blank.time)
     noisy = {key: values + ENCODER * rng.normal(size=len(values)) for key, values in joints.items()}
     return replace(smoothed("manoeuvre", blank.time, {**noisy, **blank.channels}, robot, ENCODER), attitude_sigma=STAR)
@@ -308,7 +294,7 @@ def _simulated(seed: int) -> Manoeuvre:
     """Return the same manoeuvre with the readings of the true robot's sensors while its joints moved exactly."""
     manoeuvre = _planned(seed)
     exact = replace(manoeuvre, motion=excitation(paper.EXCITATION))
-    simulator = Posterior.of(_model(ACCEL, paper.body(paper.TRUTH), 0.0), [exact], step=0.5)
+    simulator = Posterior.of(_model(ACCEL, body_of(paper.TRUTH), 0.0), [exact], step=0.5)
     recording = simulate_recordings(simulator, np.random.default_rng(seed + 1), np.zeros(simulator.size))[0]
     return replace(manoeuvre, recording=recording)
 
@@ -321,12 +307,10 @@ def sample_posterior(arm_spread: float, seed: int) -> Identification:
 
     Parameters
     ----------
-    arm_spread : float
-        Relative width of the links' priors; 0 for an exactly known arm.
-    seed : int
-        Seed of all random numbers.
+    arm_spread : float; relative width of the links' priors; 0 for an exactly known arm
+    seed : int; seed of all random numbers
     """
-    manoeuvre, guess = _simulated(seed), paper.body(paper.GUESS)
+    manoeuvre, guess = _simulated(seed), body_of(paper.GUESS)
     posterior = Posterior.of(_model(ACCEL, guess, 0.0), [manoeuvre])
     start = fit(posterior, np.zeros(posterior.size)).z
     if arm_spread > 0.0:
@@ -339,7 +323,7 @@ def encoder_grades(grades: Sequence[float], seed: int) -> list[Floats]:
     """Return relative standard deviations (10,) by grade of the accelerometer where the joints are measured too."""
     manoeuvre, rows = _planned(seed), []
     for grade in grades:
-        posterior = Posterior.of(_model(grade, paper.body(paper.TRUTH), 0.0), [manoeuvre], step=1.0)
+        posterior = Posterior.of(_model(grade, body_of(paper.TRUTH), 0.0), [manoeuvre], step=1.0)
         rows.append(Knowledge.at(posterior, np.zeros(posterior.size)).sd / np.abs(paper.TRUTH))
     return rows
 

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.common.quantities import body_of as body
-
-__all__ = ["EXCITATION", "GUESS", "LIMIT", "RESULT_POOR", "RESULT_WELL", "SIGMAS", "TRUTH", "body"]
-
 # true mass [kg], centre of mass [m] and inertia xx, yy, zz, xy, xz, yz [kg m2]
 TRUTH = np.array([2645.9, -0.532, -0.281, 1.499, 5665.5, 3033.0, 7067.2, 54.2, 145.1, -123.2])
 

@@ -16,8 +16,6 @@ from studies.common.quantities import MASS, MOMENTS
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 
-__all__ = ["STUDY", "BaseBody", "goals_of", "run"]
-
 EXACT = 1e-6  # largest relative error that is allowed without noise; the integration allows no smaller one
 WANTED = 0.01  # relative standard deviation of the mass that is wanted from one manoeuvre
 LEVEL = 0.95  # level of the region of the sampled posterior that should hold the truth

@@ -16,17 +16,6 @@ from studies.base_body.analysis import GRADES, BaseBody
 from studies.common.ets7 import BASE
 from studies.common.quantities import HEADINGS, LABELS, squared_distances
 
-__all__ = [
-    "case_table",
-    "error_figure",
-    "estimates",
-    "grades",
-    "posterior_figure",
-    "precision_figure",
-    "precision_table",
-]
-__all__ += ["readings", "sampler_sentence", "squared_distance"]
-
 Table = tuple[list[str], list[list[str]]]
 
 # names of the noise-free cases in words

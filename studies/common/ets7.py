@@ -21,10 +21,6 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 
-__all__ = ["ACCEL", "ACCELEROMETER", "BASE", "BIAS", "CORNER", "ENCODER", "EXCURSION", "INTERVAL", "LIMITS"]
-__all__ += ["PERIOD", "PERIODS", "RADIUS", "RAMP", "RAMPS", "RATE", "START", "TIP", "TIP_RATE", "TIP_SPEED"]
-__all__ += ["FlightManoeuvre", "ets7", "excitation", "extended_wrist", "tip_of", "tip_speed"]
-
 Floats = NDArray[np.floating]
 
 BASE, TIP = "base_link", "tip"  # links of the base body and of the end-effector
@@ -121,8 +117,7 @@ def excitation(q: Floats, slow: float = 1.0) -> Excitation:
 
     Parameters
     ----------
-    q : (6,) array
-        q1 and q2 of joint 1, of joint 2, of joint 3 [rad].
+    q : (6,) array; q1 and q2 of joint 1, of joint 2, of joint 3 [rad]
     """
     wrist = np.array(extended_wrist())
     return Excitation(

@@ -18,8 +18,6 @@ from studies.common import mission
 from studies.common.ets7 import TIP_SPEED
 from studies.common.flight import flown_along
 
-__all__ = ["manoeuvre_figure", "robot_outline"]
-
 SIDE = 1.15  # longer side of the drawing as printed [in]
 
 # lengths that the scale may have [m]; the longest is drawn that is at most half as long as the drawing is wide
@@ -32,8 +30,7 @@ def robot_outline(robot: Robot, position: Floats | None = None) -> Figure:
 
     Parameters
     ----------
-    position : (n,) array, optional
-        Positions of the joints, by default zero [rad, m].
+    position : (n,) array, optional; positions of the joints, by default zero [rad, m]
     """
     rest = np.zeros((1, len(robot.joints)))
     state = JointState(rest if position is None else np.reshape(position, rest.shape), rest, rest)

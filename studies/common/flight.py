@@ -24,19 +24,6 @@ from studies.truth.mujoco import Orbit, Rotor, Truth, TruthModel
 from studies.truth.numerics import substeps
 from studies.truth.recordings import by_axis
 
-__all__ = [
-    "ORBIT",
-    "Flown",
-    "flown_along",
-    "fly",
-    "light_wheel",
-    "prescribed",
-    "readings",
-    "record",
-    "smoothed",
-    "true_robot",
-]
-
 ORBIT = Orbit(radius=RADIUS)
 
 WATCH_STEP = 0.2  # interval at which the robot is looked at, which is also the largest step of the integration [s]
@@ -54,8 +41,7 @@ def true_robot(robot: Robot, orbit: Orbit | None = ORBIT, **hidden: Any) -> Trut
     Parameters
     ----------
     robot : Robot
-    orbit : Orbit, optional
-        Without one there is no gravity gradient.
+    orbit : Orbit, optional; without one there is no gravity gradient
     **hidden
         What else moves it, keywords of `studies.truth.mujoco.TruthModel`.
     """
@@ -71,10 +57,8 @@ def prescribed(motion: Motion, times: Sequence[float] | Floats, step: float) -> 
     Parameters
     ----------
     motion : Motion
-    times : (T,) array
-        Times at which the robot will be read [s].
-    step : float
-        Largest integration step [s].
+    times : (T,) array; times at which the robot will be read [s]
+    step : float; largest integration step [s]
     """
     asked = {0.0, *map(float, times)}
     for start, stop in pairwise([0.0, *map(float, times)]):
@@ -100,14 +84,10 @@ def fly(
 
     Parameters
     ----------
-    robot : Robot
-        The robot as it truly is.
-    motion : Motion
-        Motion of its joints.
-    times : (T,) array
-        Sample times [s].
-    step : float
-        Largest integration step [s].
+    robot : Robot; the robot as it truly is
+    motion : Motion; motion of its joints
+    times : (T,) array; sample times [s]
+    step : float; largest integration step [s]
     rate, attitude : (3,) and (4,) array_like
         Initial rate in base axes [rad/s] and quaternion x, y, z, w, base to orbit axes.
     orbit, **hidden
@@ -129,15 +109,12 @@ def readings(
 
     Parameters
     ----------
-    truth : Truth
-        What truly happened.
-    joints : sequence of str
-        Names of the joints.
+    truth : Truth; what truly happened
+    joints : sequence of str; names of the joints
     sigmas : mapping of str to float
         Family of channels (position, torque, rate, accel, attitude) -> noise per sample, in the order in which the
         noise is drawn.
-    rng : numpy.random.Generator or None
-        Source of the noise; there is none where left out.
+    rng : numpy.random.Generator or None; source of the noise; there is none where left out
     by_channel : collection of str
         Families whose noise is drawn channel after channel and not sample after sample. The studies differ in it, and
         their numbers with it.
@@ -164,15 +141,11 @@ def smoothed(name: str, times: Floats, channels: Mapping[str, Floats], robot: Ro
 
     Parameters
     ----------
-    name : str
-        Name of the recording.
-    times : (T,) array
-        Sample times [s].
-    channels : mapping
-        See `readings`.
+    name : str; name of the recording
+    times : (T,) array; sample times [s]
+    channels : mapping; see `readings`
     robot : Robot
-    encoder : float
-        Noise of the joint positions.
+    encoder : float; noise of the joint positions
     """
     recording = Recording(name, None, np.asarray(times), dict(channels))
     sigma: dict[int, float] = {0: encoder}

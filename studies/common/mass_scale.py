@@ -20,9 +20,6 @@ from bayesid.robot.kinematics import Kinematics
 from bayesid.robot.regressors import balance_regressor, gradient_regressor, momentum_regressor
 from bayesid.robot.robot import Robot
 
-__all__ = ["Determined", "consistent_accelerations", "determined", "rates_at_rest"]
-
-
 SEEN = 1e-7  # relative size above which a component along the base parameters is more than rounding
 
 
@@ -60,10 +57,8 @@ def determined(base: BaseParameters, equations: Floats) -> Determined:
 
     Parameters
     ----------
-    base : BaseParameters
-        Base parameters of the robot.
-    equations : (rows, standard) array
-        Matrix that multiplies the standard parameters; the right sides do not matter.
+    base : BaseParameters; base parameters of the robot
+    equations : (rows, standard) array; matrix that multiplies the standard parameters; the right sides do not matter
     """
     scaled, length = equilibrated(equations)
     square = np.concatenate([scaled, np.zeros((equations.shape[1], equations.shape[1]))])  # as many rows as columns
@@ -89,18 +84,13 @@ def consistent_accelerations(
 
     Parameters
     ----------
-    robot : Robot
-        Robot with its inertial parameters.
-    motion : Kinematics
-        Motion of its joints at T instants.
-    rate : (T, 3) array
-        Angular velocity of the base, base axes [rad/s].
-    wrench : (T, 6) array
-        External force and torque on the base about its origin, base axes [N, N m].
+    robot : Robot; robot with its inertial parameters
+    motion : Kinematics; motion of its joints at T instants
+    rate : (T, 3) array; angular velocity of the base, base axes [rad/s]
+    wrench : (T, 6) array; external force and torque on the base about its origin, base axes [N, N m]
     zenith : (T, 3) array, optional
         Unit vector from the Earth's centre to the robot, base axes; by default there is no gravity gradient.
-    gradient : float
-        Size of the gravity gradient [1/s2] (`gradient_regressor`).
+    gradient : float; size of the gravity gradient [1/s2] (`gradient_regressor`)
 
     Returns
     -------

@@ -40,20 +40,6 @@ from studies.common.ets7 import (
 from studies.common.models import ARM_SPREAD, NOISE, base_model
 from studies.truth.mujoco import Truth
 
-__all__ = [
-    "DURATION",
-    "ENCODERS",
-    "POINTS",
-    "REACH",
-    "ROWS",
-    "SENSORS",
-    "TRUTH_STEP",
-    "base_unknown",
-    "flight_manoeuvre",
-    "fly",
-]
-__all__ += ["problem", "published_robot", "recorded", "splines", "start", "true_arm"]
-
 DURATION = 120.0  # length of every manoeuvre [s]
 POINTS = 8  # number of free control points of every joint's spline
 
@@ -92,8 +78,7 @@ def base_unknown(arm_spread: float = ARM_SPREAD, **options: Any) -> Model:
 
     Parameters
     ----------
-    arm_spread : float
-        Relative width of the links' priors; the arm is known exactly where it is 0.
+    arm_spread : float; relative width of the links' priors; the arm is known exactly where it is 0
     **options
         Further arguments of `studies.common.models.base_model`.
     """
@@ -123,8 +108,7 @@ def problem(
     family : TrajectoryFamily
     *criteria
         Criteria that may be evaluated.
-    limits : Limits
-        Limits, by default the rule of the flight.
+    limits : Limits; limits, by default the rule of the flight
     **options
         Further arguments of `bayesid.design.Problem`.
     """

@@ -15,8 +15,6 @@ from bayesid.simulation.effects import GravityGradient, SensorBias
 from bayesid.simulation.model import RATE_SIGMA, spread_links
 from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, ENCODER, RADIUS, RATE, ets7
 
-__all__ = ["ARM_SPREAD", "NOISE", "base_model", "guess_about", "orbiting_model"]
-
 ARM_SPREAD = 0.025  # relative width of a link's prior where the arm is not known exactly: its mass is then known to 5 %
 
 # family of channels -> noise per sample of a recording [rad, rad/s, m/s2], in the order in which it is drawn
@@ -64,19 +62,14 @@ def base_model(
     ----------
     noise : mapping of SensorKind to float
         Standard deviation of the white noise of each sensor, per sample [rad/s, m/s2, rad].
-    robot : Robot, optional
-        Robot with its nominal arm, by default ETS-VII as shipped.
-    centre : InertialParameters, optional
-        Centre of the base's prior, by default the base of the robot.
+    robot : Robot, optional; robot with its nominal arm, by default ETS-VII as shipped
+    centre : InertialParameters, optional; centre of the base's prior, by default the base of the robot
     base_spread, arm_spread : float
         Relative widths of the priors of the base, whose mass is by default uncertain by a factor of e², and of the
         links; the arm is known exactly where its width is 0.
-    gradient : bool
-        Whether the model has the gravity gradient.
-    bias : float
-        Prior standard deviation of the accelerometer's constant error [m/s2]; 0 where it has none.
-    rate_sigma : float
-        Prior standard deviation of the initial rate [rad/s]; 0 for a start at rest.
+    gradient : bool; whether the model has the gravity gradient
+    bias : float; prior standard deviation of the accelerometer's constant error [m/s2]; 0 where it has none
+    rate_sigma : float; prior standard deviation of the initial rate [rad/s]; 0 for a start at rest
     """
     robot = ets7() if robot is None else robot
     centre = robot.link(robot.base).inertial if centre is None else centre
@@ -102,8 +95,7 @@ def guess_about(truth: InertialParameters, spread: float, rng: np.random.Generat
     Parameters
     ----------
     truth : InertialParameters
-    spread : float
-        Relative width of the prior in log-Cholesky coordinates.
+    spread : float; relative width of the prior in log-Cholesky coordinates
     rng : numpy.random.Generator
     """
     factor = np.asarray(log_cholesky_factor(jnp.asarray(spread * rng.normal(size=10))))

@@ -20,8 +20,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Outcomes", "Workers", "read_store", "run_trials"]
-
 Workers = int | Executor  # number of processes of this machine, one for this process itself; or an executor of any kind
 
 # task and source of random numbers -> result; task and result are made of what JSON has, or of arrays
@@ -68,18 +66,14 @@ def run_trials(
     ----------
     function : callable
         Task and generator -> result. With workers it is a function of a module.
-    tasks : sequence
-        Tasks; a longer sequence that starts alike goes on from the same store.
-    store : path, optional
-        File that keeps the results; they are kept in memory alone where left out.
-    seed : int
-        Seed of all trials.
+    tasks : sequence; tasks; a longer sequence that starts alike goes on from the same store
+    store : path, optional; file that keeps the results; they are kept in memory alone where left out
+    seed : int; seed of all trials
     workers : int or concurrent.futures.Executor
         Number of processes, where trials run in this process if it is one; or an executor, such as that of
         dask.distributed, whose workers must be able to import the function. A trial that such an executor repeats,
         since the worker was lost, counts once.
-    progress : callable, optional
-        Receives one line per finished trial, with the rate and the time left.
+    progress : callable, optional; receives one line per finished trial, with the rate and the time left
 
     Raises
     ------

@@ -13,8 +13,6 @@ from pathlib import Path
 from bayesid._io.words import counted
 from bayesid.app.report_origin import origin_text
 
-__all__ = ["MODELS", "processor", "study_origin"]
-
 ROOT = Path(__file__).resolve().parents[2]  # folder of the checkout
 
 # options of single studies that say how much is repeated
@@ -31,12 +29,9 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
 
     Parameters
     ----------
-    name : str
-        Name of the study.
-    options : argparse.Namespace
-        Options of the command as `studies.common.study.Command.parse` gives them.
-    inputs : sequence of Path
-        Files that the study reads, by default the robot ETS-VII.
+    name : str; name of the study
+    options : argparse.Namespace; options of the command as `studies.common.study.Command.parse` gives them
+    inputs : sequence of Path; files that the study reads, by default the robot ETS-VII
     """
     seed = getattr(options, "seed", None)
     flags = [f"--{option}" for option, value in vars(options).items() if value is True]

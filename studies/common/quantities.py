@@ -9,8 +9,6 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_unit
 from bayesid.robot.inertial_parameters import InertialParameters
 
-__all__ = ["HEADINGS", "JUDGED", "LABELS", "MASS", "MOMENTS", "body_of", "inertia_matrix", "squared_distances"]
-
 MASS, MOMENTS = 0, [4, 5, 6]  # indices of the mass and of the three moments of inertia
 JUDGED = [MASS, *MOMENTS]  # indices of the quantities by which studies judge an identification; the others may be zero
 

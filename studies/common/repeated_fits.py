@@ -30,8 +30,6 @@ from studies.common.ets7 import BASE, INTERVAL
 from studies.common.models import ARM_SPREAD
 from studies.common.monte_carlo import Workers, run_trials
 
-__all__ = ["Realised", "Reference", "repeat"]
-
 STEPS = 4  # number of Gauss-Newton steps of every fit
 
 
@@ -138,14 +136,10 @@ def repeat(
 
     Parameters
     ----------
-    parameters : (n,) array
-        Parameters of the manoeuvre.
-    points : int
-        Number of free control points of every joint.
-    count : int
-        Number of flights.
-    arm_spread : float
-        Relative width of the links' priors, from which the true arm of every flight is drawn.
+    parameters : (n,) array; parameters of the manoeuvre
+    points : int; number of free control points of every joint
+    count : int; number of flights
+    arm_spread : float; relative width of the links' priors, from which the true arm of every flight is drawn
     seed, store, workers, progress
         See `studies.common.monte_carlo.run_trials`.
     """

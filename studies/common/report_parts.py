@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from bayesid.report import Document
 
-__all__ = ["TERMS", "add_number_table", "columns", "glossary"]
-
 # meanings by term, as reports write it
 TERMS = {
     "a-optimal": "smallest sum of the posterior variances",
@@ -51,12 +49,9 @@ def add_number_table(
     Parameters
     ----------
     document : Document
-    header : sequence of str
-        Title of each column.
-    rows : sequence of sequence of str
-        Cells, row by row.
+    header : sequence of str; title of each column
+    rows : sequence of sequence of str; cells, row by row
     caption : str, optional
-    words : int
-        Number of leading columns that hold words.
+    words : int; number of leading columns that hold words
     """
     document.table(header, rows, caption, ["left"] * words + ["right"] * (len(header) - words))

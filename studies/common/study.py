@@ -26,9 +26,6 @@ from bayesid.report import Document
 from studies.common.provenance import MODELS, study_origin
 from studies.common.report_parts import glossary
 
-__all__ = ["MADE", "TRIALS", "WORKERS", "Command", "CsvTable", "Finding", "Goal", "Picture", "Report", "Setup"]
-__all__ += ["Statement", "Study", "Verdict", "show"]
-
 R = TypeVar("R")
 
 # options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`
@@ -260,12 +257,9 @@ class Study(Command, Generic[R]):
 
         Parameters
         ----------
-        result : object
-            What `run` returned.
-        output : Path
-            File of the PDF; the other files have its name but for their endings.
-        origin : str, optional
-            Where the report comes from, `studies.common.provenance.study_origin`.
+        result : object; what `run` returned
+        output : Path; file of the PDF; the other files have its name but for their endings
+        origin : str, optional; where the report comes from, `studies.common.provenance.study_origin`
         """
         report = self.report(result)
         document = report.document(result, output)

@@ -20,9 +20,6 @@ from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
 from studies.common.flight import ORBIT, fly, light_wheel, record
 from studies.truth.mujoco import Body, nearby
 
-__all__ = ["ATTITUDE_SIGMA", "CAUSES", "DURATION", "ENCODER_SIGMA", "INTERVAL", "KNOWN", "MOMENTUM", "MOTION", "RATE"]
-__all__ += ["RATE_SIGMA", "Amplitude", "Attitude", "Case", "Step", "World", "run"]
-
 DURATION = 300.0  # duration of a recording [s]; the attitude control is off throughout
 INTERVAL = 1.0  # time between samples of all sensors [s]
 
@@ -57,12 +54,9 @@ def draw_world(recordings: int, seed: int, spread: float, duration: float = DURA
 
     Parameters
     ----------
-    recordings, seed : int
-        Number of recordings, and seed of all random numbers.
-    spread : float
-        Relative width of the draw of the true base about the published one.
-    duration : float
-        Duration of a recording [s].
+    recordings, seed : int; number of recordings, and seed of all random numbers
+    spread : float; relative width of the draw of the true base about the published one
+    duration : float; duration of a recording [s]
     """
     rng, robot = np.random.default_rng(seed), ets7()
     published = robot.link(BASE).inertial
@@ -177,16 +171,11 @@ def analyse(
 
     Parameters
     ----------
-    world : World
-        What truly happens.
-    spread : float
-        Relative width of the base's prior.
-    seed : int
-        Seed of the diagnosis, and of the draws for the band.
-    progress : callable, optional
-        Receives a fraction and a sentence.
-    names : sequence of str, optional
-        Names of the candidates, by default the whole catalogue.
+    world : World; what truly happens
+    spread : float; relative width of the base's prior
+    seed : int; seed of the diagnosis, and of the draws for the band
+    progress : callable, optional; receives a fraction and a sentence
+    names : sequence of str, optional; names of the candidates, by default the whole catalogue
     """
     model = model_of(spread)
     effects = None if names is None else [create(name).attach(model.robot) for name in names]
@@ -276,10 +265,8 @@ def run(
 
     Parameters
     ----------
-    duration : float
-        Duration of each recording [s].
-    names : sequence of str, optional
-        Names of the candidates, by default the whole catalogue.
+    duration : float; duration of each recording [s]
+    names : sequence of str, optional; names of the candidates, by default the whole catalogue
     """
     cases = KNOWN if full else {"1 %": KNOWN["1 %"]}
     return {

@@ -26,8 +26,6 @@ from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup
 from studies.ets7_drift import analysis
 from studies.ets7_drift.analysis import Case
 
-__all__ = ["STUDY", "attitude_figure", "goals_of"]
-
 # factor by which the predicted attitude should be nearer to the measured one than the present simulation
 BETTER = 100.0
 

@@ -27,8 +27,6 @@ from studies.common import mission
 from studies.common.ets7 import ACCEL, ACCELEROMETER, INTERVAL, RATE
 from studies.common.quantities import HEADINGS, JUDGED
 
-__all__ = ["LONGEST", "Answer", "Repeated", "Result", "designed_motion", "read_rows", "run"]
-
 ABSENT = 1e3  # noise that stands for an accelerometer that is not there [m/s2]
 LONGEST = 1e6  # largest number of repetitions, which take years of moving without a pause
 TARGET = 0.01  # relative standard deviation to reach
@@ -249,8 +247,7 @@ def run(
 
     Parameters
     ----------
-    rates, accels : sequence of str
-        Labels of the sensors.
+    rates, accels : sequence of str; labels of the sensors
     """
     motion = designed_motion(tables / "excitation-manoeuvres.csv")
     information = information_of(motion)

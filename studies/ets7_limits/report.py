@@ -32,8 +32,6 @@ from studies.common.report_parts import add_number_table
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.ets7_limits.analysis import LONGEST, Answer, Result, run
 
-__all__ = ["STUDY", "goals", "time_needed"]
-
 YEAR = 3.156e7  # length of a year [s]
 
 # largest relative sd that is wanted, and largest differences from another report and from realised errors

@@ -23,8 +23,6 @@ from studies.common.report_parts import add_number_table
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.excitation.search import FULL, QUICK, Contest, Crowd, Result, run
 
-__all__ = ["STUDY", "goals"]
-
 # titles of the manoeuvres
 TITLES = {
     "printed": "the paper's optimum, as printed",

@@ -54,20 +54,6 @@ from studies.common.quantities import JUDGED
 from studies.common.repeated_fits import Realised, repeat
 from studies.truth.bodies import SERVICER4
 
-__all__ = [
-    "FULL",
-    "QUICK",
-    "Cloud",
-    "Contest",
-    "Crowd",
-    "Result",
-    "Rivals",
-    "Searches",
-    "other_problem",
-    "other_robots",
-]
-__all__ += ["paper_problem", "run", "shrunk"]
-
 # criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume
 FEW: tuple[Criterion, ...] = (Paper26(), Paper26Intended(), ConditionNumber(), DOptimal())
 
@@ -350,14 +336,10 @@ def run(
 
     Parameters
     ----------
-    search : Search, optional
-        Effort of each design.
-    flown : sequence of str
-        Designs to fly in a quick run.
-    random : int, optional
-        Number of random manoeuvres.
-    points : int
-        Number of free control points of every joint.
+    search : Search, optional; effort of each design
+    flown : sequence of str; designs to fly in a quick run
+    random : int, optional; number of random manoeuvres
+    points : int; number of free control points of every joint
     """
     search = replace(search or (FULL if full else QUICK), executor=executor)
     repeats = (400 if full else 100) if repeats is None else repeats

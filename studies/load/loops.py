@@ -44,9 +44,6 @@ from studies.common.models import ARM_SPREAD, NOISE, orbiting_model
 from studies.common.quantities import JUDGED, body_of, squared_distances
 from studies.load import paper
 
-__all__ = ["AT_MOST", "GOAL", "LIMITED", "LOAD", "SAFE", "SPREAD", "TRUTH_STEP", "Flight", "Iteration"]
-__all__ += ["excitation", "fly_again", "fly_loop", "iterate", "load_unknown", "robot_with_load"]
-
 LOAD, LINK = "load", "link6"  # name of the load, and link that carries it
 
 # rule of the flight, and a bound on the rotation of the base [rad], which depends on the load
@@ -70,8 +67,7 @@ def load_unknown(spread: float, arm_spread: float) -> Model:
 
     Parameters
     ----------
-    spread, arm_spread : float
-        Relative widths of the priors of the load and of the links.
+    spread, arm_spread : float; relative widths of the priors of the load and of the links
     """
     robot = robot_with_load()
     links = spread_links(robot, arm_spread, (BASE, LOAD))
@@ -141,10 +137,8 @@ def iterate(*, seed: int, search: Search) -> list[Iteration]:
 
     Parameters
     ----------
-    seed : int
-        Seed of the searches.
-    search : Search
-        Effort of each design.
+    seed : int; seed of the searches
+    search : Search; effort of each design
     """
     known = orbiting_model(robot_with_load(), [BodyPrior(LOAD, body_of(paper.GUESS), 1.0)], rate_sigma=0.0)
     spacecraft, criterion = MuJoCoSpacecraft(step=TRUTH_STEP), Paper26Intended()
@@ -209,14 +203,10 @@ def fly_loop(folder: Path, *, seed: int, search: Search, progress: Progress = si
 
     Parameters
     ----------
-    folder : Path
-        Folder of the loop's files; an interrupted run goes on there.
-    seed : int
-        Seed of all random numbers.
-    search : Search
-        Effort of each design.
-    progress : Progress
-        Receiver of the fraction done.
+    folder : Path; folder of the loop's files; an interrupted run goes on there
+    seed : int; seed of all random numbers
+    search : Search; effort of each design
+    progress : Progress; receiver of the fraction done
     """
     problem = mission.problem(load_unknown(SPREAD, ARM_SPREAD), mission.splines(), DOptimal(), limits=SAFE)
     loop = Loop(
@@ -249,12 +239,9 @@ def fly_again(folder: Path, flight: Flight, *, seed: int) -> Flight:
 
     Parameters
     ----------
-    folder : Path
-        Folder of the loop's files.
-    flight : Flight
-        The loop's flight.
-    seed : int
-        Seed of bias and noise.
+    folder : Path; folder of the loop's files
+    flight : Flight; the loop's flight
+    seed : int; seed of bias and noise
     """
     problem = mission.problem(load_unknown(SPREAD, 0.0), mission.splines(), DOptimal(), limits=SAFE)
     spacecraft, model, bodies, chi2, largest = MuJoCoSpacecraft(seed), problem.plan.model, [], [], []

@@ -9,8 +9,6 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from studies.common.quantities import inertia_matrix
 
-__all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "errors", "readings"]
-
 # true load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of
 # `bayesid.inference.body_quantities.BODY_QUANTITIES`
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])

@@ -23,8 +23,6 @@ from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup
 from studies.load import loops, paper
 from studies.load.loops import Flight, Iteration
 
-__all__ = ["STUDY", "Result", "run"]
-
 NOISE_FREE = 1e-6  # relative error to reach without noise
 
 # squared distance from the mean within which ten parameters lie with 99 %, in standard deviations

@@ -24,8 +24,6 @@ from bayesid.report.numbers import format_text
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.register import known_effects
 
-__all__ = ["Pieces", "content"]
-
 Pieces = list[str]  # a text in pieces: plain, code, plain, and so on
 
 # description of the package, which states its version and the order of its rooms

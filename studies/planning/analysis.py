@@ -29,9 +29,6 @@ from studies.common.quantities import squared_distances
 from studies.common.repeated_fits import Reference
 from studies.truth.numerics import quintic_step
 
-__all__ = ["BODIES", "DRAWS", "EXCURSION", "KINDS", "SHIPS", "SPREAD", "STAGES", "Planner", "Result", "Row", "Swing"]
-__all__ += ["fitted", "fly", "miss_of", "planners_model", "run", "true_ship"]
-
 # position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started
 FlownPose = tuple[Floats, Floats]
 
@@ -219,12 +216,9 @@ def row_of(
 
     Parameters
     ----------
-    parameters : (n,) array
-        Parameters of the identifying manoeuvre, `studies.common.mission.splines`.
-    arm_spread : float
-        Relative width of the links' priors.
-    count : int
-        Number of ships.
+    parameters : (n,) array; parameters of the identifying manoeuvre, `studies.common.mission.splines`
+    arm_spread : float; relative width of the links' priors
+    count : int; number of ships
     seed, store, workers, progress
         See `studies.common.monte_carlo.run_trials`.
     """
@@ -336,8 +330,7 @@ def run(
 
     Parameters
     ----------
-    parameters : (n,) array
-        Parameters of the identifying manoeuvre, `studies.common.mission.splines`.
+    parameters : (n,) array; parameters of the identifying manoeuvre, `studies.common.mission.splines`
     """
     ships = (SHIPS if full else FEW) if ships is None else ships
     rows = {

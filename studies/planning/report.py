@@ -23,8 +23,6 @@ from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Repor
 from studies.ets7_limits.analysis import designed_motion
 from studies.planning.analysis import BODIES, DRAWS, EXCURSION, KINDS, SHIPS, SPREAD, STAGES, Result, Row, run
 
-__all__ = ["STUDY", "Result", "goals", "run"]
-
 MANOEUVRES = "excitation-manoeuvres.csv"  # table of the study of excitation
 HEADLINE = next(iter(mission.ROWS))  # what is known of the arm in the headline
 

@@ -6,7 +6,8 @@ the standard deviation of the base's ten parameters. ``python -m studies.sensors
 ``reports/sensors.pdf``.
 """
 
-from studies.sensors.report import STUDY, Effort, Result, run
+from studies.sensors.report import STUDY
+from studies.sensors.result import Effort, Result, run
 
 __all__ = ["STUDY", "Effort", "Result", "main", "run"]
 

@@ -58,9 +58,6 @@ from studies.sensors.signals import (
     recording_of,
 )
 
-__all__ = ["Balance", "Refits", "Scalar", "attenuation", "falsified", "refit_all"]
-__all__ += ["regress", "scalars", "solve_balance"]
-
 PERIODS = 2  # number of periods of the cosine
 
 
@@ -85,12 +82,9 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
 
     Parameters
     ----------
-    draws : int
-        Number of simulated sets of noise.
-    rng : numpy.random.Generator
-        Source of the noise.
-    samples : int
-        Number of samples, so large that sums are integrals.
+    draws : int; number of simulated sets of noise
+    rng : numpy.random.Generator; source of the noise
+    samples : int; number of samples, so large that sums are integrals
     """
     phase = 2.0 * np.pi * PERIODS * np.linspace(0.0, 1.0, samples)
     rule = estimators.integral(phase)
@@ -138,8 +132,7 @@ class Balance:
 
     Parameters
     ----------
-    states : (3, T, joints) array
-        Joint positions, velocities, accelerations.
+    states : (3, T, joints) array; joint positions, velocities, accelerations
     """
 
     def __init__(self, states: Floats) -> None:
@@ -153,10 +146,8 @@ class Balance:
 
         Parameters
         ----------
-        rate, change : (T, 3) array
-            Angular velocity and its derivative, base axes [rad/s, rad/s2].
-        accel : (T, 3) array
-            Acceleration as the accelerometer reads it [m/s2].
+        rate, change : (T, 3) array; angular velocity and its derivative, base axes [rad/s, rad/s2]
+        accel : (T, 3) array; acceleration as the accelerometer reads it [m/s2]
         """
         base, arm = _balance(self.base, self.arm, rate, change, accel)
         return np.asarray(base), np.asarray(arm)[..., 0]
@@ -176,12 +167,9 @@ def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATE
 
     Parameters
     ----------
-    draws : Draws
-        Sets of noise about a flight without gravity gradient, which (19) does not hold.
-    noise : Noise
-        Level of noise.
-    treatments : sequence of Treatment
-        Treatments to compare.
+    draws : Draws; sets of noise about a flight without gravity gradient, which (19) does not hold
+    noise : Noise; level of noise
+    treatments : sequence of Treatment; treatments to compare
 
     Returns
     -------
@@ -279,10 +267,8 @@ def refit_all(
 
     Parameters
     ----------
-    chosen : sequence of str
-        Levels of noise.
-    counts : mapping of str to int
-        Number of fits by procedure, `LIKELIHOOD` or `PAPER`.
+    chosen : sequence of str; levels of noise
+    counts : mapping of str to int; number of fits by procedure, `LIKELIHOOD` or `PAPER`
     seed, store, workers, progress
         See `studies.common.monte_carlo.run_trials`.
 

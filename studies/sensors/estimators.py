@@ -26,10 +26,6 @@ from studies.base_body import paper
 from studies.common.quantities import MOMENTS
 from studies.sensors import signals
 
-__all__ = ["EQUAL", "EXACT", "LIKELIHOOD", "PAPER", "PIECES", "STEP", "Estimator", "Linear", "Solved", "Spread"]
-__all__ += ["TREATMENTS", "WEIGHTED", "WHOLE", "WITHOUT_JUNCTIONS", "as_read", "constant", "integral", "integrated"]
-__all__ += ["integrated_whole", "linearised", "raw_posterior", "velocity_estimators"]
-
 # errors (N, 10), stated standard deviations (N, 10) and chi-square per degree of freedom (N,) of N estimates
 Solved = tuple[Floats, Floats, Floats]
 

@@ -17,10 +17,8 @@ from studies.common.report_parts import columns
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.sensors import tables
 from studies.sensors.estimators import EQUAL, EXACT, LIKELIHOOD, PAPER, WEIGHTED, WHOLE, WITHOUT_JUNCTIONS, Spread
-from studies.sensors.result import REALISTIC, Effort, Result, run
+from studies.sensors.result import REALISTIC, Result, run
 from studies.sensors.signals import motion
-
-__all__ = ["STUDY", "Effort", "Result", "run"]
 
 PLANE = 0.02  # error that the paper quotes for the plane and expects in three dimensions
 

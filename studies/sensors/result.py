@@ -16,8 +16,6 @@ from studies.sensors.checks import falsified, scalars
 from studies.sensors.estimators import LIKELIHOOD, PAPER, Spread, linearised
 from studies.sensors.signals import Draws, Flight, Noise, fly, levels
 
-__all__ = ["REALISTIC", "Effort", "Result", "run"]
-
 # level of noise that stands for good sensors of today: star sensor, accelerometer [m/s2], encoder [rad]
 REALISTIC = "2″, 1e-5, 1e-5"
 
@@ -72,8 +70,7 @@ def run(
 
     Parameters
     ----------
-    effort : Effort, optional
-        Effort in place of what ``full`` says.
+    effort : Effort, optional; effort in place of what ``full`` says
     """
     effort = effort or (FULL if full else SMALL)
     began = time.perf_counter()

@@ -29,9 +29,6 @@ from studies.common.ets7 import BIAS, INTERVAL, ets7, excitation
 from studies.common.models import base_model
 from studies.truth.recordings import by_axis
 
-__all__ = ["Differences", "Draws", "Flight", "LowPass", "Noise", "Polynomial", "SavitzkyGolay", "SmoothingSpline"]
-__all__ += ["Treatment", "Wiener", "fly", "junctions", "levels", "model_of", "motion", "near_junctions"]
-
 # distance from a junction of (27) within which samples of the base's sensors may be left out [s]. The third derivative
 # of the joints' positions jumps at a junction.
 NEAR = 2.0

@@ -15,9 +15,6 @@ from studies.common.quantities import JUDGED, MASS, MOMENTS
 from studies.sensors.estimators import LIKELIHOOD, PAPER, Spread
 from studies.sensors.result import Result
 
-__all__ = ["diverging", "equal_rms", "honesty_of", "level_figure", "percent", "rms_of", "rms_pair"]
-__all__ += ["treatment_figure"]
-
 PLAIN = 0.01  # size of a percentage below which it is written with its power of ten, as `format_number` does
 
 
@@ -64,10 +61,8 @@ def equal_rms(result: Result, level: str, name: str) -> tuple[str, str]:
     Parameters
     ----------
     result : Result
-    level : str
-        Level of noise; where fits diverge at it, errors are orders of magnitude only.
-    name : str
-        `PAPER` or `EQUAL`.
+    level : str; level of noise; where fits diverge at it, errors are orders of magnitude only
+    name : str; `PAPER` or `EQUAL`
     """
     spread = result.accelerometers[level][name]
     mass, moment = MASS, spread.worst()

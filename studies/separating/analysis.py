@@ -27,21 +27,6 @@ from studies.common.monte_carlo import run_trials
 from studies.common.repeated_fits import Reference
 from studies.truth.mujoco import Truth, leak
 
-__all__ = [
-    "DRIFT",
-    "FLIGHTS",
-    "FULL",
-    "QUICK",
-    "RIVALS",
-    "SPREAD",
-    "STAGES",
-    "TRUTHS",
-    "Expected",
-    "Linearised",
-    "Realised",
-]
-__all__ += ["Result", "expectations", "flown", "realise", "references", "run"]
-
 # the two causes with the widths of their priors; the leak is a small one, of half a millinewton
 CANDIDATES: tuple[Effect, ...] = (WheelMomentum(1.0), ThrusterLeak(5e-4, 5e-4))
 
@@ -170,10 +155,8 @@ def unexplained_information(information: Floats, group: Sequence[int], rest: Seq
 
     Parameters
     ----------
-    information : (n, n) array
-        Information about all unknowns, without their prior.
-    group, rest : sequences of int
-        Unknowns of interest, and those to be marginalised with a standard normal prior.
+    information : (n, n) array; information about all unknowns, without their prior
+    group, rest : sequences of int; unknowns of interest, and those to be marginalised with a standard normal prior
     """
     inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
     cross = information[np.ix_(rest, group)]
@@ -262,8 +245,7 @@ def references(motions: Mapping[str, Motion], arm_spread: float = ARM_SPREAD) ->
     Parameters
     ----------
     motions : mapping of str to Motion
-    arm_spread : float
-        Relative width of the links' priors.
+    arm_spread : float; relative width of the links' priors
     """
     model = rival_model(RIVALS, arm_spread)
     z = drifting(mission.problem(model, mission.splines()).plan.unknowns)
@@ -303,12 +285,9 @@ def flown(motion: Motion, truth: str, size: Floats, **options: Any) -> Truth:
 
     Parameters
     ----------
-    motion : Motion
-        Motion of the joints.
-    truth : str
-        Label of the rival, or empty for none.
-    size : (3,) array
-        Momentum of the wheels [N m s] or torque of the leak [N m], base axes.
+    motion : Motion; motion of the joints
+    truth : str; label of the rival, or empty for none
+    size : (3,) array; momentum of the wheels [N m s] or torque of the leak [N m], base axes
     **options
         Further arguments of `studies.common.mission.fly`.
     """
@@ -334,14 +313,11 @@ def realise(
     Parameters
     ----------
     motions : mapping of str to Motion
-    known : mapping of str to Reference
-        The same manoeuvres linearised, with the links' priors of the same width.
-    noises : int
-        Number of sets of flights for each truth.
+    known : mapping of str to Reference; the same manoeuvres linearised, with the links' priors of the same width
+    noises : int; number of sets of flights for each truth
     seed, store, progress
         See `studies.common.monte_carlo.run_trials`.
-    arm_spread : float
-        Relative width of the distribution from which the true arm is drawn.
+    arm_spread : float; relative width of the distribution from which the true arm is drawn
     """
 
     def compared(task: tuple[str, int], rng: np.random.Generator) -> dict[str, Any]:
@@ -409,10 +385,8 @@ def run(
 
     Parameters
     ----------
-    points : int
-        Number of free control points of every joint.
-    search : Search, optional
-        Effort of each design.
+    points : int; number of free control points of every joint
+    search : Search, optional; effort of each design
     """
     search = search or (FULL if full else QUICK)
     flights = (FLIGHTS if full else 40) if flights is None else flights

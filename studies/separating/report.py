@@ -21,8 +21,6 @@ from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Repor
 from studies.separating import analysis
 from studies.separating.analysis import Result
 
-__all__ = ["STUDY", "factor_figure", "goals"]
-
 RIVALRY = 2.2  # log Bayes factor above which a cause is preferred to its one rival with a probability of 0.9 or more
 SURE = 0.9  # share of flights, and of directions, in which the factor is to be exceeded
 TICKS = (-10, -3, -1, 0, 1, 3, 10, 30, 100, 300)  # ticks of log Bayes factors

@@ -31,8 +31,7 @@ def smooth_motion(
     joints : int; number of joints
     duration : float; length of the motion [s]; the joints rest before and after it
     seed : int; seed of amplitudes, frequencies and phases
-    amplitude, centre : (joints,) array_like or float
-        Typical excursion and position at rest of each joint [rad, or m].
+    amplitude, centre : (joints,) array_like or float; typical excursion and position at rest of each joint [rad, or m]
     frequencies : sequence of float; frequencies of the sines [Hz], each varied by up to 20 % from joint to joint
     ramp : float; length of each ramp [s]
 

@@ -166,8 +166,7 @@ def study_toml(
     title, base : str; title of the study, and name of the base link
     sensors : Sensors; noise and mounting as the study states them
     attitudes : sequence of (4,) array; initial quaternion of each recording, x, y, z, w
-    orbits : sequence of Orbit or None, optional
-        Orbit of each recording; they differ in the argument of latitude only.
+    orbits : sequence of Orbit or None, optional; orbit of each recording; they differ in the argument of latitude only
     effects : sequence of str, optional
         Effects of the study's model; the study says nothing of its model where left out.
     link_spread, initial_rate : settings of the study of the same names

@@ -55,9 +55,6 @@ from studies.whole_system.system import (
     true_robot,
 )
 
-__all__ = ["SCORED", "TAIL", "Coverage", "Method", "Result", "Sampled"]
-__all__ += ["linear_prior", "regress", "run"]
-
 WINDOW, ORDER = 9, 3  # number of samples, and order, of the local polynomials through the rates
 ROUNDS = 4  # number of iterations that weight the equations by their residuals; more change the masses by less than 1 %
 
@@ -352,10 +349,8 @@ def run(
 
     Parameters
     ----------
-    duration : float
-        Duration of each manoeuvre [s].
-    effective_samples : float
-        Effective sample size of each identification.
+    duration : float; duration of each manoeuvre [s]
+    effective_samples : float; effective sample size of each identification
     """
     truth, drawings = true_robot(), drawn(true_robot(), seed)
     progress("manoeuvres")

@@ -31,8 +31,6 @@ from studies.whole_system.system import (
     groups,
 )
 
-__all__ = ["STUDY"]
-
 GROUPS = ("base", "load", "arm", "whole system")  # titles of the columns for the masses of `groups`
 
 # titles of the ten log-Cholesky coordinates of a body

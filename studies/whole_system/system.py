@@ -30,10 +30,6 @@ from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE, TIP, ets7
 from studies.common.models import ARM_SPREAD, guess_about, orbiting_model
 from studies.truth.mujoco import Thrust, Truth, smooth_motion
 
-__all__ = ["BASE_SPREAD", "COULOMB", "LOAD", "LOAD_SPREAD", "START_RATE", "Information", "Known", "Sensors"]
-__all__ += ["TORQUE", "VISCOUS", "bodies", "drawn", "flights", "fly", "groups", "hand_speed", "informed", "model_of"]
-__all__ += ["record", "spreads", "true_robot"]
-
 LOAD, HAND = "load", "link6"  # name of the load, and link that carries it
 
 # relative widths of the priors in log-Cholesky coordinates: links of the arm known from drawings, to 5 % of each mass
@@ -80,10 +76,8 @@ def model_of(robot: Robot, *, torques: bool = False) -> Model:
 
     Parameters
     ----------
-    robot : Robot
-        The drawings, on which the priors are centred.
-    torques : bool
-        True if the joint torques are measured; friction in every joint is then unknown.
+    robot : Robot; the drawings, on which the priors are centred
+    torques : bool; true if the joint torques are measured; friction in every joint is then unknown
     """
     priors = [BodyPrior(name, robot.link(name).inertial, spread) for name, spread in spreads(robot).items()]
     if not torques:
@@ -117,16 +111,11 @@ def fly(
 
     Parameters
     ----------
-    robot : Robot
-        The robot as it truly is.
-    seed : int
-        Seed of the manoeuvre.
-    duration : float
-        Duration of the manoeuvre [s].
-    joints : tuple of int
-        Joints that move.
-    amplitude : float
-        Typical excursion [rad].
+    robot : Robot; the robot as it truly is
+    seed : int; seed of the manoeuvre
+    duration : float; duration of the manoeuvre [s]
+    joints : tuple of int; joints that move
+    amplitude : float; typical excursion [rad]
     **hidden
         Further influences, keywords of `studies.truth.mujoco.TruthModel`.
     """
@@ -209,12 +198,9 @@ class Information:
 
         Parameters
         ----------
-        sensors : Sensors
-            Sensors in use.
-        known : sequence of str
-            Names of bodies that are taken as exactly known.
-        widths : mapping of str to float, optional
-            Widths of the bodies' priors in place of those of the drawings.
+        sensors : Sensors; sensors in use
+        known : sequence of str; names of bodies that are taken as exactly known
+        widths : mapping of str to float, optional; widths of the bodies' priors in place of those of the drawings
         """
         drawn = spreads(self.robot)
         chosen = drawn if widths is None else widths

@@ -7,8 +7,6 @@ import numpy as np
 import bayesid
 from bayesid.diagnosis import diagnose
 
-__all__ = ["identify"]
-
 
 def identify(folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return the ten quantities of the base and their standard deviations."""

@@ -14,8 +14,6 @@ from mujoco import sysid
 from scipy.interpolate import UnivariateSpline
 from scipy.optimize import approx_fprime
 
-__all__ = ["identify"]
-
 RATE, ACCEL, ENCODER = 1e-5, 1e-5, 1e-6  # noise of the sensors [rad/s, m/s2, rad]
 POINT = np.array([0.1, -0.15, 0.3])  # where the accelerometer sits [m]
 BASE = "base_link"
