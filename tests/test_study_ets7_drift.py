@@ -47,7 +47,7 @@ def test_the_band_about_the_prediction_is_that_of_its_errors(result):
 def test_the_present_model_cannot_follow_the_drift(result):
     """Every fit of it drives the base away, so that the base is held at its prior."""
     gain, truth = result.diagnosis.gain, result.world.base
-    assert result.diagnosis.held
+    assert result.diagnosis.bodies_fixed
     assert gain.before.chi2_per_sample > 100.0
     assert np.abs((gain.after.bodies.mean - truth) / gain.after.bodies.sd).max() < 4.0
 

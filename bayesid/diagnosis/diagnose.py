@@ -37,6 +37,7 @@ from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 __all__ = ["diagnose", "identify_extended"]
 
 
+@threadpool_limits.wrap(limits=1)  # thousands of small factorisations: threads only get in each other's way
 def diagnose(
     model: Model,
     manoeuvres: Sequence[Manoeuvre],
@@ -80,38 +81,11 @@ def diagnose(
     InputError
         If the numbers of a recording cannot be in the units of the format.
     """
-    with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
-        return _diagnose(
-            model,
-            manoeuvres,
-            seed,
-            effects,
-            bounds,
-            prior or CausePrior(),
-            settings,
-            knows_latitude,
-            executor,
-            progress,
-        )
-
-
-def _diagnose(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
-    seed: int,
-    effects: Sequence[Effect] | None,
-    stated: Mapping[str, Sequence[PhysicalBound]] | None,
-    prior: CausePrior,
-    settings: DiagnosisSettings,
-    knows_latitude: bool,
-    executor: Executor | None,
-    progress: Progress,
-) -> Diagnosis:
     rng, clock = np.random.default_rng(seed), PhaseClock()
-    whole, model = model, model.without_torque
+    whole, model, prior = model, model.without_torque, prior or CausePrior()
     catalogue = _catalogue(model, manoeuvres, knows_latitude) if effects is None else list(effects)
     on_torques = [] if whole.torque is None else torque_candidates(whole)
-    limits = bounds_by_label([*catalogue, *on_torques], whole, stated)
+    limits = bounds_by_label([*catalogue, *on_torques], whole, bounds)
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
     refuse_wrong_units(posterior if whole.torque is None else Posterior.of(whole, manoeuvres))
@@ -177,19 +151,24 @@ def _diagnose(
 
 def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bool) -> list[Effect]:
     """Return the candidates that could be at work in some recordings."""
-    wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
-    longest = max(float(item.recording.time[-1]) for item in manoeuvres)
+    wheels = any(f"wheel_momentum.{axis}" in manoeuvre.recording.channels for manoeuvre in manoeuvres for axis in "xyz")
+    longest = max(float(manoeuvre.recording.time[-1]) for manoeuvre in manoeuvres)
     return candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
 
 
 def identify_extended(
-    diagnosis: Diagnosis,
-    seed: int,
-    *,
-    effective_samples: float = 4000.0,
-    progress: Progress = silent,
+    diagnosis: Diagnosis, seed: int, *, effective_samples: float = 4000.0, progress: Progress = silent
 ) -> Identification:
-    """Sample the extended model."""
+    """Sample the extended model.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    seed : int
+    effective_samples : float
+        Size of the sample that is worth as many independent draws.
+    progress : Progress, optional
+    """
     return identify(
         diagnosis.posterior, seed, start=diagnosis.start, effective_samples=effective_samples, progress=progress
     )

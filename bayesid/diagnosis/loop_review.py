@@ -39,7 +39,16 @@ class DiagnosisReview:
     settings: DiagnosisSettings = DEFAULT_SETTINGS
 
     def review(self, model: Model, manoeuvres: Sequence[Manoeuvre], seed: int, file: Path) -> Review:
-        """Diagnose, write the content of diagnosis.json to a file, and return its summary."""
+        """Diagnose, write the content of diagnosis.json to a file, and return its summary.
+
+        Parameters
+        ----------
+        model : Model
+        manoeuvres : sequence of Manoeuvre
+            All that the loop has flown.
+        seed : int
+        file : Path
+        """
         result = diagnose(
             model,
             manoeuvres,
@@ -50,10 +59,10 @@ class DiagnosisReview:
             knows_latitude=self.knows_latitude,
         )
         write_json(file, result.to_dict())
-        found = result.probabilities
+        probabilities = result.probabilities
         return Review(
             result.verdict.status.value,
             tuple(result.verdict.causes),
-            result.alarm.silent or found.nothing >= self.settings.trusted_from,
-            {**found.inclusion, "unknown": found.unknown},
+            result.alarm.silent or probabilities.nothing >= self.settings.trusted_from,
+            {**probabilities.inclusion, "unknown": probabilities.unknown},
         )

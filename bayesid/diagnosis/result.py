@@ -37,11 +37,8 @@ from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
 __all__ = ["Diagnosis"]
 
-SHOWN = 0.01
-"""Probability down to which sets of causes are listed; the most probable one always is."""
-
-PAIRS = 10
-"""Largest number of pairs of causes that imitate each other in diagnosis.json."""
+SHOWN = 0.01  # probability down to which sets of causes are listed; the most probable one always is
+PAIRS = 10  # largest number of pairs of causes that imitate each other in diagnosis.json
 
 
 @dataclass(frozen=True)
@@ -109,7 +106,7 @@ class Diagnosis:
         return self.search.alarm
 
     @property
-    def held(self) -> bool:
+    def bodies_fixed(self) -> bool:
         """Whether every fit of the present model diverged, so that its bodies stay at their prior's centre."""
         return self.search.base.bodies_fixed
 
@@ -267,33 +264,27 @@ class Diagnosis:
         identification : Identification, optional
             Of the extended model, where it was sampled.
         """
-        verdict, found = self.verdict, self.probabilities
-        inclusion = found.inclusion
+        verdict, probabilities = self.verdict, self.probabilities
         fitted = {name: _fitted(self, name) for name in verdict.causes}
         return {
             "status": verdict.status.value,
-            "causes": [name for name in verdict.causes if name in inclusion and name in found.causes],
+            "causes": [name for name in verdict.causes if name in probabilities.causes],
             "equivalent_to": {cause: list(names) for cause, names in verdict.equivalent_to.items()},
             "ambiguous_with": [list(names) for names in verdict.ambiguous_with],
             "probability": {
-                "nothing": found.nothing,
-                "unknown": found.unknown,
-                "causes": {members[0]: found.of_any(members) for members in _ordered(self)},
+                "nothing": probabilities.nothing,
+                "unknown": probabilities.unknown,
+                "causes": {members[0]: probabilities.of_any(members) for members in _ordered(self)},
             },
             "sets": _sets(self),
             "candidates": [_candidate(row, fitted.get(row.name)) for row in self.candidates],
-            "unexplained": {
-                "file": "unexplained.csv",
-                "signal_to_noise": self.unexplained.signal_to_noise,
-                "fixed_in": None if self.unexplained.fixed_in is None else self.unexplained.fixed_in.value,
-            },
+            "unexplained": {"file": "unexplained.csv", **_wrench(self.unexplained)},
             "disturbance": {
-                "signal_to_noise": self.disturbance.signal_to_noise,
-                "fixed_in": None if self.disturbance.fixed_in is None else self.disturbance.fixed_in.value,
+                **_wrench(self.disturbance),
                 "correlations": [correlation._asdict() for correlation in self.torque_correlations],
             },
             "joint_torques": _torques(self.torques),
-            "bodies_held": self.held,
+            "bodies_held": self.bodies_fixed,
             "gain": _gain(self),
             "inertial_parameters": {change.name: change.to_dict() for change in self.parameter_changes},
             "simulation_error": {error.kind.value: error.to_dict() for error in self.simulation_errors},
@@ -311,10 +302,10 @@ class Diagnosis:
             "sensitivity_varies": list(self.sensitivity.varied),
             "settings": asdict(self.settings),
             "bounds": {
-                label: {item.unit: {"largest": item.largest, "reason": item.reason} for item in items}
-                for label, items in self.bounds.items()
+                label: {bound.unit: {"largest": bound.largest, "reason": bound.reason} for bound in bounds}
+                for label, bounds in self.bounds.items()
             },
-            "prior": {"one_more_cause": found.prior.one_more, "generic": found.prior.generic},
+            "prior": {"one_more_cause": probabilities.prior.one_more, "generic": probabilities.prior.generic},
             "seconds": dict(self.seconds),
             "identification": None if identification is None else identification.to_dict(),
         }
@@ -327,33 +318,37 @@ def _ordered(result: Diagnosis) -> list[list[str]]:
     return [sorted(members, key=lambda name: (name not in named, -inclusion[name], name)) for members in result.classes]
 
 
+def _wrench(wrench: DisturbingWrench) -> dict[str, Any]:
+    fixed_in = None if wrench.fixed_in is None else wrench.fixed_in.value
+    return {"signal_to_noise": wrench.signal_to_noise, "fixed_in": fixed_in}
+
+
 def _sets(result: Diagnosis) -> list[dict[str, Any]]:
-    sets = result.probabilities.sets
-    shown = [item for index, item in enumerate(sets) if index == 0 or item.probability >= SHOWN]
+    best, *others = result.probabilities.sets
     fitted = [frozenset(result.after.labels), frozenset()]
     return [
         {
-            "causes": list(item.causes),
-            "generic": [] if item.generic is None else [item.generic],
-            "probability": item.probability,
-            "log_evidence": item.log_evidence,
-            "refitted": item.generic is None and frozenset(item.causes) in fitted,
-            "sizes": [size.to_dict() for size in result.sizes_of(item)],
+            "causes": list(cause_set.causes),
+            "generic": [] if cause_set.generic is None else [cause_set.generic],
+            "probability": cause_set.probability,
+            "log_evidence": cause_set.log_evidence,
+            "refitted": cause_set.generic is None and frozenset(cause_set.causes) in fitted,
+            "sizes": [size.to_dict() for size in result.sizes_of(cause_set)],
         }
-        for item in shown
+        for cause_set in (best, *(other for other in others if other.probability >= SHOWN))
     ]
 
 
 def _gain(result: Diagnosis) -> dict[str, Any]:
     gain = result.gain
-    held = {
-        key: None if side.held_out is None else float(side.held_out.sum())
-        for key, side in (("before", gain.before), ("after", gain.after))
+    score = {
+        key: None if figures.held_out is None else float(figures.held_out.sum())
+        for key, figures in (("before", gain.before), ("after", gain.after))
     }
     names = gain.before.bodies.names
     return {
         "chi2_per_sample": {"before": gain.before.chi2_per_sample, "after": gain.after.chi2_per_sample},
-        "held_out_log_score": held if held["before"] is not None else None,
+        "held_out_log_score": score if score["before"] is not None else None,
         "residual_rms_in_sigma": {"before": gain.before.rms, "after": gain.after.rms},
         "within_one_sigma": {"before": gain.before.inside, "after": gain.after.inside},
         "parameter_shift_in_sd": dict(zip(names, gain.shift.tolist(), strict=True)),
@@ -361,29 +356,29 @@ def _gain(result: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _torques(found: TorqueReading | TorquesNotRead | None) -> dict[str, Any] | None:
-    if found is None:
+def _torques(reading: TorqueReading | TorquesNotRead | None) -> dict[str, Any] | None:
+    if reading is None:
         return None
-    if isinstance(found, TorquesNotRead):
-        return {"status": "not evaluated", "reason": found.reason}
-    before, after = found.chi2_per_sample
+    if isinstance(reading, TorquesNotRead):
+        return {"status": "not evaluated", "reason": reading.reason}
+    before, after = reading.chi2_per_sample
     return {
-        "status": found.verdict.status.value,
-        "causes": [name for name in found.verdict.causes if name in found.probabilities.causes],
-        "ambiguous_with": [list(names) for names in found.verdict.ambiguous_with],
-        "probability": {"nothing": found.probabilities.nothing, "unknown": found.probabilities.unknown},
+        "status": reading.verdict.status.value,
+        "causes": [name for name in reading.verdict.causes if name in reading.probabilities.causes],
+        "ambiguous_with": [list(names) for names in reading.verdict.ambiguous_with],
+        "probability": {"nothing": reading.probabilities.nothing, "unknown": reading.probabilities.unknown},
         "candidates": [
             {
                 "name": row.name,
                 "probability": row.probability,
                 "amplitude": {
-                    item.name: quantity(mean, sd, item.unit)
-                    for item, mean, sd in zip(row.quantities, row.mean.tolist(), row.sd.tolist(), strict=True)
+                    amplitude.name: quantity(mean, sd, amplitude.unit)
+                    for amplitude, mean, sd in zip(row.quantities, row.mean.tolist(), row.sd.tolist(), strict=True)
                 },
             }
-            for row in found.causes
+            for row in reading.causes
         ],
-        "p_value": found.p_value,
+        "p_value": reading.p_value,
         "chi2_per_sample": {"before": before, "after": after},
     }
 
@@ -394,8 +389,8 @@ def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
     Of a cause with amplitudes in each recording the first recording's have plain keys.
     """
     after = result.after
-    found = amplitudes_of(after, name) + amplitudes_of_others(after, name) + instants_of(after, name)
-    return {"amplitude": {item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit) for item in found}}
+    amplitudes = amplitudes_of(after, name) + amplitudes_of_others(after, name) + instants_of(after, name)
+    return {"amplitude": {key: quantity(mean, sd, unit) for (key, unit), mean, sd in amplitudes}}
 
 
 def _candidate(row: Candidate, fitted: dict[str, Any] | None) -> dict[str, Any]:

@@ -165,7 +165,7 @@ def _failures(known: str, case: Case) -> list[str]:
         f"Base known to {known}: the present simulation cannot be mended by its base. "
         + (
             "Every fit of it diverges, so that the base stays at its prior"
-            if case.diagnosis.held
+            if case.diagnosis.bodies_fixed
             else f"Fitted to the rates, the base's mass is {format_signed(float(off), 0)} % off"
         )
         + f", and the attitude is {format_number(_rms(case, 'fitted'), 2)} degrees off (rms)."

@@ -432,7 +432,7 @@ def _diagnosis(document: Document, result: Result) -> None:
     )
     if result.wheels:
         minutes = format_number(result.reverse_seconds / 60.0, 2)
-        unfitted = sum(diagnosis.held for diagnosis in result.wheels.values())
+        unfitted = sum(diagnosis.bodies_fixed for diagnosis in result.wheels.values())
         chi2 = [diagnosis.gain.before.chi2_per_sample for diagnosis in result.wheels.values()]
         document.paragraph(
             f"Without the recorded wheel a rigid body leaves chi-square per sample of {format_number(min(chi2), 2)} to "

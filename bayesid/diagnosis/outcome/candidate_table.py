@@ -1,4 +1,8 @@
-"""What the data say of each candidate by itself, and the amplitudes of those that are fitted together."""
+"""What the data say of each candidate by itself, and the amplitudes of those that are fitted together.
+
+The power of a candidate is averaged over the prior of its size (A. O'Hagan, J. W. Stevens and M. J. Campbell, Assurance
+in clinical trial design, Pharmaceutical Statistics 4, 2005).
+"""
 
 from __future__ import annotations
 
@@ -29,10 +33,10 @@ __all__ = [
     "cause_power",
     "effect_amplitude",
     "instants_of",
+    "reported_normal",
 ]
 
-POWER_DRAWS = 400
-"""Simulated studies for the power of a candidate, good to 0.025."""
+POWER_DRAWS = 400  # simulated studies for the power of a candidate, good to 0.025
 
 
 @dataclass(frozen=True)
@@ -125,16 +129,17 @@ def _amplitudes(
 ) -> _Amplitudes:
     posterior = AmplitudePosterior.of(evidence, [name])
     places = np.concatenate([posterior.amplitudes[name, group] for group in groups])
-    own = places[: len(quantities)]  # of a cause per recording, those of the first
-    return quantities, posterior.mean[own], np.sqrt(np.diag(posterior.covariance)[own]), posterior.upper_limits()[own]
+    first = places[: len(quantities)]  # of a cause per recording, those of the first
+    sd = np.sqrt(np.diag(posterior.covariance)[first])
+    return quantities, posterior.mean[first], sd, posterior.upper_limits()[first]
 
 
 def _quantities(effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
     """Return the amplitudes of each candidate in the order of its columns."""
-    found: dict[str, tuple[Quantity, ...]] = {}
+    quantities: dict[str, tuple[Quantity, ...]] = {}
     for kind in cause_kinds():
-        found |= kind.quantities(kind.of(effects))
-    return found
+        quantities |= kind.quantities(kind.of(effects))
+    return quantities
 
 
 def _noise(name: str, search: ModelSearch) -> Candidate:
@@ -191,35 +196,56 @@ def cause_power(
     shares = np.exp([variant.log_weight for variant in cause.variants])
     counts = rng.multinomial(draws, shares / shares.sum())
     for form, drawn in enumerate(np.split(np.arange(draws), np.cumsum(counts)[:-1])):
-        for own in evidence.spectra([name], {name: form}):
-            scales = np.exp(rng.uniform(np.log(own.range.low), np.log(own.range.high), size=(len(drawn), 1)))
-            amplitudes = scales * own.root * rng.normal(size=(len(drawn), len(own.columns)))
+        for spectrum in evidence.spectra([name], {name: form}):
+            scales = np.exp(rng.uniform(np.log(spectrum.range.low), np.log(spectrum.range.high), size=(len(drawn), 1)))
+            amplitudes = scales * spectrum.root * rng.normal(size=(len(drawn), len(spectrum.columns)))
             amplitudes = np.ones_like(amplitudes) if cause.fixed else amplitudes
-            scores[np.ix_(drawn, columns)] -= amplitudes @ gram.matrix[np.ix_(own.columns, columns)]
+            scores[np.ix_(drawn, columns)] -= amplitudes @ gram.matrix[np.ix_(spectrum.columns, columns)]
     return float(np.mean(evidence.log_evidences([name], scores) > alarm.largest.threshold(level)))
 
 
 def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
-    """Return the amplitudes of one cause of a hypothesis."""
+    """Return the amplitudes of one cause of a hypothesis.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    label : str
+        Name of the cause, of those of a fault of the noise, too.
+    """
     for index, effect in enumerate(hypothesis.fit.effects):
         if label == effect.candidate:
             mean, sd = effect_amplitude(hypothesis, index)
             return list(map(CauseAmplitude, effect.quantities, mean.tolist(), sd.tolist()))
     for kind in cause_kinds():
-        if found := kind.amplitudes(hypothesis.perturbed, hypothesis.fit, label):
-            return found
+        if amplitudes := kind.amplitudes(hypothesis.perturbed, hypothesis.fit, label):
+            return amplitudes
     fault = next(fault for fault in hypothesis.faults if fault.label == label)
     return list(map(CauseAmplitude, fault.quantities, fault.mean.tolist(), fault.sd.tolist()))
 
 
 def instants_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
-    """Return when a cause of a hypothesis set in, in each recording in which it did; of most causes nothing."""
-    return [item for kind in cause_kinds() for item in kind.instants(hypothesis.perturbed, hypothesis.fit, label)]
+    """Return when a cause of a hypothesis set in, in each recording in which it did; of most causes nothing.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    label : str
+        Name of the cause.
+    """
+    return [instant for kind in cause_kinds() for instant in kind.instants(hypothesis.perturbed, hypothesis.fit, label)]
 
 
 def amplitudes_of_others(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
-    """Return the amplitudes in all recordings but the first, as ``RECORDING.key``, of a cause that has some in each."""
-    names = [item.recording.name for item in hypothesis.fit.posterior.manoeuvres]
+    """Return the amplitudes in all recordings but the first, as ``RECORDING.key``, of a cause that has some in each.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    label : str
+        Name of the cause.
+    """
+    names = [manoeuvre.recording.name for manoeuvre in hypothesis.fit.posterior.manoeuvres]
     index = next((i for i, effect in enumerate(hypothesis.fit.effects) if label == effect.candidate), None)
     if index is None or not hypothesis.fit.effects[index].per_recording:
         return []
@@ -233,16 +259,37 @@ def amplitudes_of_others(hypothesis: Hypothesis, label: str) -> list[CauseAmplit
 
 
 def effect_amplitude(hypothesis: Hypothesis, index: int, recording: int = 0) -> tuple[Floats, Floats]:
-    """Return mean and standard deviation of what is reported of one effect of a fit, in one recording."""
+    """Return mean and standard deviation, (k,), of what is reported of one effect of a fit, in one recording.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    index : int
+        Index of the effect in the fit.
+    recording : int
+        Index of the recording; the first one's stands for all where the effect has the same values in each.
+    """
+    mean, covariance = reported_normal(hypothesis, index, recording)
+    return mean, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def reported_normal(hypothesis: Hypothesis, index: int, recording: int = 0) -> tuple[Floats, Floats]:
+    """Return mean, (k,), and covariance, (k, k), of the same (`effect_amplitude`).
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    index, recording : int
+        Indices of the effect in the fit and of the recording.
+    """
     fit = hypothesis.fit
     effect = fit.effects[index]
     if not effect.parameters:
-        return np.zeros(0), np.zeros(0)
+        return np.zeros(0), np.zeros((0, 0))
     count = len(effect.parameters)
     before = recording * count if effect.per_recording else 0
     first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index]) + before
     coordinates = np.ravel(fit.coordinates[index])[before : before + count]
     covariance = fit.covariance[first : first + count, first : first + count]
     slope = report_slopes(effect, coordinates)
-    sd = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
-    return report_of(effect, coordinates), sd
+    return report_of(effect, coordinates), slope @ covariance @ slope.T

@@ -13,8 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.evidence.cause_sets import CauseSet
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup
-from bayesid.diagnosis.outcome.candidate_table import Candidate
-from bayesid.diagnosis.response.perturbation import report_of, report_slopes
+from bayesid.diagnosis.outcome.candidate_table import Candidate, reported_normal
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.relinearise import SetSearch
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
@@ -24,14 +23,10 @@ __all__ = ["Z95", "GroupSize", "VectorSize", "group_sizes", "vector_size"]
 Z95 = float(stats.norm.ppf(0.975))
 """Standard deviations to either side that hold 95 % of a normal distribution."""
 
-CIRCLE95 = float(np.sqrt(stats.chi2.ppf(0.95, 2)))
-"""Standard deviations to all sides that hold 95 % of a normal distribution in a plane."""
+CIRCLE95 = float(np.sqrt(stats.chi2.ppf(0.95, 2)))  # the same to all sides in a plane
 
-SEEN = 3.0
-"""Standard deviations that a magnitude must be from zero for its direction to be known."""
-
-SAME = 1e-9
-"""Relative difference up to which the bound of a group of amplitudes is that of a unit."""
+SEEN = 3.0  # standard deviations that a magnitude must be from zero for its direction to be known
+SAME = 1e-9  # relative difference up to which the bound of a group of amplitudes is that of a unit
 
 
 @dataclass(frozen=True)
@@ -57,7 +52,14 @@ class VectorSize:
 
     @classmethod
     def of_normal(cls, unit: str, mean: Floats, covariance: Floats) -> VectorSize:
-        """Return the size of a vector with a normal distribution of mean (3,) and covariance (3, 3)."""
+        """Return the size of a vector with a normal distribution.
+
+        Parameters
+        ----------
+        unit : str
+        mean : (3,) array
+        covariance : (3, 3) array
+        """
         magnitude = float(np.linalg.norm(mean))
         if magnitude == 0.0:
             return cls(unit, mean, 0.0, float(np.sqrt(np.trace(covariance))), np.pi)
@@ -97,20 +99,17 @@ def vector_size(hypothesis: Hypothesis, label: str) -> VectorSize | None:
     label : str
         Name of the cause.
     """
-    fit = hypothesis.fit
-    index = next((place for place, effect in enumerate(fit.effects) if effect.candidate == label), None)
+    effects = hypothesis.fit.effects
+    index = next((place for place, effect in enumerate(effects) if effect.candidate == label), None)
     if index is None:
         return None
-    effect = fit.effects[index]
+    effect = effects[index]
     start = _first_vector([(quantity.name, quantity.unit) for quantity in effect.quantities])
     if start is None:
         return None
-    count = len(effect.parameters)
-    point = fit.coordinates[index][:count]
-    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
-    covariance = fit.covariance[first : first + count, first : first + count]
-    slope, mean = (values[start : start + 3] for values in (report_slopes(effect, point), report_of(effect, point)))
-    return VectorSize.of_normal(effect.quantities[start].unit, mean, slope @ covariance @ slope.T)
+    vector = slice(start, start + 3)
+    mean, covariance = reported_normal(hypothesis, index)
+    return VectorSize.of_normal(effect.quantities[start].unit, mean[vector], covariance[vector, vector])
 
 
 def _first_vector(quantities: Sequence[tuple[str, str]]) -> int | None:

@@ -1,4 +1,8 @@
-"""The wrench it would take: what a fit leaves, as force and torque on the base against time, and its frame."""
+"""The wrench it would take: what a fit leaves, as force and torque on the base against time, and its frame.
+
+Force and torque have Gaussian-process priors in a basis of cosines, their scales and corners at their most probable
+values (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and 5).
+"""
 
 from __future__ import annotations
 
@@ -147,8 +151,8 @@ def disturbing_wrench(
     def turned(series: Sequence[Floats]) -> dict[Frame, list[Floats]]:
         return {
             frame: [
-                np.einsum("tba,tb->ta", turns[r][own], value)
-                for r, (own, value) in enumerate(zip(fresh, series, strict=True))
+                np.einsum("tba,tb->ta", turns[r][instants], value)
+                for r, (instants, value) in enumerate(zip(fresh, series, strict=True))
             ]
             for frame, (turns, _) in rotations.items()
         }
@@ -156,7 +160,7 @@ def disturbing_wrench(
     return DisturbingWrench(
         snr,
         tuple(manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres),
-        [time[own] for time, own in zip(times, fresh, strict=True)],
+        [time[instants] for time, instants in zip(times, fresh, strict=True)],
         turned(torque),
         turned(force),
         list(torque_sd),
@@ -179,10 +183,12 @@ def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
         to_base = np.swapaxes(attitude, -1, -2)
         zenith = np.asarray(instant.environment.zenith)
         argument_of_latitude = np.asarray(instant.environment.argument_of_latitude)
-        there = np.linalg.norm(zenith, axis=-1).min() > 0.5
+        in_orbit = np.linalg.norm(zenith, axis=-1).min() > 0.5
         normal = np.zeros_like(zenith) + np.array([0.0, 0.0, 1.0])
-        local = np.stack([zenith, np.cross(normal, zenith), normal], axis=-1) if there else np.eye(3) + 0.0 * attitude
-        start = argument_of_latitude[:, :1] if there else np.zeros((len(attitude), 1))
+        local, start = np.eye(3) + 0.0 * attitude, np.zeros((len(attitude), 1))
+        if in_orbit:
+            local = np.stack([zenith, np.cross(normal, zenith), normal], axis=-1)
+            start = argument_of_latitude[:, :1]
         cos, sin, zero = np.cos(start), np.sin(start), 0.0 * start
         # node axes seen in the recording's orbit axes
         rows = [np.stack(row, axis=-1) for row in ((cos, sin, zero), (-sin, cos, zero), (zero, zero, zero + 1.0))]
@@ -229,8 +235,9 @@ def _composed(
     hypothesis: Hypothesis, gram: Gram, columns: Floats, causes: Sequence[CandidateCause], sudden: bool
 ) -> _Composed:
     """Return the most probable of a smooth disturbance, one with events beside it, and events with one beside them."""
-    own, deviations, log_evidence = _most_probable(gram, causes)
-    smooth = _Composed(own, deviations, gram.matrix[np.ix_(own, own)], gram.score[own], (), None, log_evidence)
+    taken, deviations, log_evidence = _most_probable(gram, causes)
+    matrix, score = gram.matrix[np.ix_(taken, taken)], gram.score[taken]
+    smooth = _Composed(taken, deviations, matrix, score, (), None, log_evidence)
     largest = next((cause.groups[0].high for cause in causes if cause.name == TORQUE), 0.0)
     if not sudden or not largest:
         return smooth
@@ -257,9 +264,9 @@ def _options(
         yield _joined(gram, smooth.columns, smooth.deviations, candidates, beside, total)
     alone = candidates.chosen(Taken.nothing(len(candidates.score)))
     if alone.places:
-        own = alone.columns
-        block = GaussianBlock.of(candidates.matrix[np.ix_(own, own)], alone.deviations)
-        share, pull = block.share(candidates.shared[own]), block.share(candidates.score[own])
+        events = alone.columns
+        block = GaussianBlock.of(candidates.matrix[np.ix_(events, events)], alone.deviations)
+        share, pull = block.share(candidates.shared[events]), block.share(candidates.score[events])
         left = Gram(gram.matrix - share.T @ share, gram.score - share.T @ pull, gram.groups)
         columns, deviations, more = _most_probable(left, causes)
         yield _joined(gram, columns, deviations, candidates, alone, alone.log_evidence + more)
@@ -268,14 +275,14 @@ def _options(
 def _joined(
     gram: Gram, columns: Integers, deviations: Floats, candidates: EventCandidates, events: ChosenEvents, total: float
 ) -> _Composed:
-    own = events.columns
-    shared = candidates.shared[np.ix_(own, columns)]
-    whole = [[gram.matrix[np.ix_(columns, columns)], shared.T], [shared, candidates.matrix[np.ix_(own, own)]]]
+    added = events.columns
+    shared = candidates.shared[np.ix_(added, columns)]
+    whole = [[gram.matrix[np.ix_(columns, columns)], shared.T], [shared, candidates.matrix[np.ix_(added, added)]]]
     return _Composed(
         columns,
         np.concatenate([deviations, events.deviations]),
         np.block(whole),
-        np.concatenate([gram.score[columns], candidates.score[own]]),
+        np.concatenate([gram.score[columns], candidates.score[added]]),
         [(int(candidates.recording[k]), candidates.course[k]) for k in events.places],
         events,
         total,
@@ -292,10 +299,10 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
     left = gram
     for cause in causes:
         name = cause.groups[0].name
-        own = SetEvidence(left.keeping([name]), [cause])
-        forms = own.forms([cause.name])
-        total += own.log_evidence([cause.name])
-        where, sigma = own.most_probable([cause.name], forms)
+        evidence = SetEvidence(left.keeping([name]), [cause])
+        forms = evidence.forms([cause.name])
+        total += evidence.log_evidence([cause.name])
+        where, sigma = evidence.most_probable([cause.name], forms)
         columns, deviations = np.concatenate([columns, gram.groups[name][where]]), np.concatenate([deviations, sigma])
         left = gram.conditioned(columns, deviations)
     return columns, deviations, total
@@ -303,7 +310,7 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
 
 def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
     """Return the columns of a group that acts in each recording by itself, (N, R k), zero in the others."""
-    parts = {item.recording: item.columns for item in bank.signatures if item.name == name}
+    parts = {signature.recording: signature.columns for signature in bank.signatures if signature.name == name}
     return block_diag(*(parts[recording] for recording in range(recordings)))
 
 
@@ -319,8 +326,8 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
         wrench = np.zeros((WAVES, 3, *time.shape, 6))
         wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
         wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
-    push = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    return block_diag(*by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
+    perturbation = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+    return block_diag(*by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data)))
 
 
 def _fixed_in(
@@ -387,7 +394,7 @@ def torque_correlations(wrench: DisturbingWrench, hypothesis: Hypothesis) -> lis
         for axis in range(3)
         if np.std(series) > 0.0 and np.std(torque[:, axis]) > 0.0
     ]
-    return sorted(correlations, key=lambda item: -abs(item.correlation))[:MOST_CORRELATIONS]
+    return sorted(correlations, key=lambda entry: -abs(entry.correlation))[:MOST_CORRELATIONS]
 
 
 def _known_series(wrench: DisturbingWrench, hypothesis: Hypothesis) -> Iterator[tuple[str, Floats]]:

@@ -1,4 +1,9 @@
-"""What an extension is worth: prediction of recordings left out, residuals, shift of the parameters, calibration."""
+"""What an extension is worth: prediction of recordings left out, residuals, shift of the parameters, calibration.
+
+The score of a recording left out is its log predictive density given the others (A. E. Gelfand, D. K. Dey and H. Chang,
+Model determination using predictive distributions, Bayesian Statistics 4, 1992), a proper score (T. Gneiting and
+A. E. Raftery, Strictly proper scoring rules, prediction, and estimation, JASA 102, 2007).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +19,7 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.noise_changes import leaving_out
 from bayesid.robot.inertial_parameters import PARAMETERS, mass_com_inertia
 
-__all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
+__all__ = ["BodyFigures", "Gain", "measure_gain"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,14 @@ class Gain:
 
 
 def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | None = None) -> Gain:
-    """Compare two hypotheses on the same recordings; an executor refits them without each of the recordings at once."""
+    """Compare two hypotheses on the same recordings.
+
+    Parameters
+    ----------
+    before, after : Hypothesis
+    executor : concurrent.futures.Executor, optional
+        Refits them without each of the recordings at once.
+    """
     first = _figures(before, executor)
     return Gain(first, first if after is before else _figures(after, executor))
 
@@ -71,18 +83,18 @@ def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | Non
 def _figures(hypothesis: Hypothesis, executor: Executor | None) -> ModelFigures:
     fit = hypothesis.fit
     posterior = fit.posterior
-    whole, there = fit.view.values, fit.view.mask
+    residual, recorded = fit.view.values, fit.view.mask
     rms = {
-        name: float(np.sqrt((whole[..., c][there[..., c]] ** 2).mean()))
+        name: float(np.sqrt((residual[..., c][recorded[..., c]] ** 2).mean()))
         for c, name in enumerate(posterior.model.channels.names)
-        if there[..., c].any()
+        if recorded[..., c].any()
     }
     return ModelFigures(
         fit.chi2 / posterior.samples,
         _held_out(hypothesis, executor) if len(posterior.manoeuvres) > 1 else None,
         rms,
-        float((np.abs(whole[there]) < 1.0).mean()),
-        body_figures(hypothesis),
+        float((np.abs(residual[recorded]) < 1.0).mean()),
+        _body_figures(hypothesis),
     )
 
 
@@ -98,8 +110,8 @@ def _held_out(hypothesis: Hypothesis, executor: Executor | None) -> Floats:
 def _bare_without(hypothesis: Hypothesis, number: int) -> float:
     """Log evidence, without constants, of all recordings but one."""
     fit = hypothesis.fit
-    outputs = [item.outputs for item in fit.posterior.whitenings]
-    masks = [own if i == number else np.zeros_like(own) for i, own in enumerate(outputs)]
+    outputs = [whitening.outputs for whitening in fit.posterior.whitenings]
+    masks = [output if i == number else np.zeros_like(output) for i, output in enumerate(outputs)]
     without = hypothesis.perturbed.with_posterior(leaving_out(fit.posterior, masks))
     return _bare(without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating))
 
@@ -108,7 +120,7 @@ def _bare(fit: Fit) -> float:
     return -fit.cost - fit.block.half_log_det
 
 
-def body_figures(hypothesis: Hypothesis) -> BodyFigures:
+def _body_figures(hypothesis: Hypothesis) -> BodyFigures:
     """Means and standard deviations of what is reported of the identified bodies."""
     fit = hypothesis.fit
     posterior = fit.posterior
@@ -120,13 +132,12 @@ def body_figures(hypothesis: Hypothesis) -> BodyFigures:
     for index, prior in enumerate(posterior.model.priors):
         if prior.nuisance:
             continue
-        here = mass_com_inertia(vector[index])
+        quantities = mass_com_inertia(vector[index])
         step = 1e-6 * np.maximum(np.abs(vector[index]), 1e-3 * np.abs(vector[index]).max())
         stepped = mass_com_inertia(vector[index] + np.diag(step))
-        turn = ((stepped - here) / step[:, None]).T
-        own = turn @ slope[index]
+        slopes = ((stepped - quantities) / step[:, None]).T @ slope[index]
         names += [f"{prior.name}.{key}" for key in BODY_QUANTITIES]
-        mean.append(here)
-        sd.append(np.sqrt(np.einsum("ij,jk,ik->i", own, covariance, own)))
+        mean.append(quantities)
+        sd.append(np.sqrt(np.einsum("ij,jk,ik->i", slopes, covariance, slopes)))
     empty = np.zeros(0)
     return BodyFigures(tuple(names), np.concatenate(mean) if mean else empty, np.concatenate(sd) if sd else empty)

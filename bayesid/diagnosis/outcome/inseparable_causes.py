@@ -1,4 +1,4 @@
-"""Causes that the recordings can hardly tell apart."""
+"""Causes that the recordings can hardly tell apart, by the canonical correlations of their signatures."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 
 __all__ = ["CausePair", "cause_cosines", "inseparable_pairs"]
 
-MOST_PROBABLE = 3
-"""Causes that are compared with all others where the verdict names none."""
+MOST_PROBABLE = 3  # causes that are compared with all others where the verdict names none
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,13 @@ class CausePair:
 
 
 def cause_cosines(evidence: SetEvidence, first: str, second: str) -> tuple[float, float]:
-    """Return the largest and the smallest canonical correlation of two causes, each in its most probable form."""
+    """Return the largest and the smallest canonical correlation of two causes, each in its most probable form.
+
+    Parameters
+    ----------
+    evidence : SetEvidence
+    first, second : str
+    """
     groups = {}
     for name in (first, second):
         form = evidence.forms([name])[name]

@@ -18,8 +18,7 @@ from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["ParameterChange", "SimulationError", "parameter_changes", "simulation_errors", "strongest_recording"]
 
-PRIOR_DRAWS = 2000
-"""Number of draws from which the width of the prior follows."""
+PRIOR_DRAWS = 2000  # from which the width of the prior follows
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def simulation_errors(before: Hypothesis, after: Hypothesis, gain: Gain) -> tupl
     for kind in channels.kinds:
         names = channels.names[channels.of(kind)]
         sigmas = [_sigma(hypothesis.fit.posterior, kind) for hypothesis in (before, after)]
-        rms = [np.array([side.rms.get(name, 0.0) for name in names]) for side in (gain.before, gain.after)]
+        rms = [np.array([figures.rms.get(name, 0.0) for name in names]) for figures in (gain.before, gain.after)]
         first, second = (float(np.linalg.norm(values * sigma)) for values, sigma in zip(rms, sigmas, strict=True))
         errors.append(SimulationError(kind, first, second, float(np.linalg.norm(sigmas[0]))))
     return tuple(errors)
@@ -135,7 +134,15 @@ def _sigma(posterior: Posterior, kind: SensorKind) -> Floats:
 
 
 def strongest_recording(before: Hypothesis, after: Hypothesis | None) -> int:
-    """Return the recording whose chi-square decreases most, or is largest where there is no extended model."""
-    sides = [before] if after is None else [before, after]
-    chi2 = [np.sum(by_recording(before.fit.posterior, side.fit.residual) ** 2, axis=1) for side in sides]
+    """Return the recording whose chi-square decreases most, or is largest where there is no extended model.
+
+    Parameters
+    ----------
+    before : Hypothesis
+        The present model.
+    after : Hypothesis or None
+        The extended model.
+    """
+    hypotheses = [before] if after is None else [before, after]
+    chi2 = [np.sum(by_recording(before.fit.posterior, model.fit.residual) ** 2, axis=1) for model in hypotheses]
     return int(np.argmax(chi2[0] - sum(chi2[1:])))

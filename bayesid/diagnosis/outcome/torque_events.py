@@ -2,7 +2,8 @@
 
 A smooth torque has one variance per frequency, with which a jump cannot be drawn. Events are chosen one by one: each is
 the one with the largest evidence beside those before, averaged over its size, and is kept while that exceeds what its
-freedom to be any of the candidates costs.
+freedom to be any of the candidates costs (J. J. Kormylo and J. M. Mendel, Maximum likelihood detection and estimation
+of Bernoulli-Gaussian processes, IEEE Transactions on Information Theory 28, 1982).
 """
 
 from __future__ import annotations
@@ -139,25 +140,22 @@ class EventCandidates:
         count, recordings = len(shapes), len(ends)
         # between two nodes of the integration a jump would be lost: there it is averaged over a step
         longest = np.asarray(perturbed.posterior.data.arrays.grid.step).max(axis=1)
-        pushed = [
-            np.stack([_courses(*own, shapes) for own in zip(time, ends, width, strict=True)])
-            for time, width in zip(times, (longest, np.zeros(recordings)), strict=True)
-        ]
         wrenches = []
-        for own in pushed:  # (R, k, S)
-            wrench = np.zeros((count, 3, recordings, own.shape[2], 6))
+        for time, width in zip(times, (longest, np.zeros(recordings)), strict=True):
+            torques = np.stack([_courses(*row, shapes) for row in zip(time, ends, width, strict=True)], axis=1)
+            wrench = np.zeros((count, 3, *time.shape, 6))
             for axis in range(3):
-                wrench[:, axis, :, :, 3 + axis] = np.swapaxes(own, 0, 1)
-            wrenches.append(wrench.reshape(3 * count, recordings, own.shape[2], 6))
-        push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-        blocks = by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data))
+                wrench[:, axis, :, :, 3 + axis] = torques  # (k, R, S)
+            wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
+        perturbation = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+        blocks = by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data))
         known, residual, apart = (by_recording(fit.posterior, x) for x in (fit.known, fit.residual, smooth))
         cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
         taken, of_smooth = fit.block.share(cross), fit.block.share(fit.known.T @ smooth)
         return EventCandidates(
             np.repeat(np.arange(recordings), count),
             shapes,
-            tuple(own for time, end in zip(times[0], ends, strict=True) for own in _courses(time, end, 0.0, shapes)),
+            tuple(row for time, end in zip(times[0], ends, strict=True) for row in _courses(time, end, 0.0, shapes)),
             sla.block_diag(*(block.T @ block for block in blocks)) - taken.T @ taken,
             np.concatenate([blocks[r].T @ apart[r] for r in range(recordings)]) - taken.T @ of_smooth,
             np.concatenate([(blocks[r].T @ residual[r]).ravel() for r in range(recordings)]),
@@ -198,7 +196,14 @@ class EventCandidates:
         return ChosenEvents(tuple(places), np.repeat(deviations, 3), total)
 
     def like(self, others: EventCandidates, events: ChosenEvents) -> ChosenEvents:
-        """Return events that were chosen among other candidates by their places among these."""
+        """Return events that were chosen among other candidates by their places among these.
+
+        Parameters
+        ----------
+        others : EventCandidates
+            All of whose shapes are among these (`nearby`).
+        events : ChosenEvents
+        """
         within = len(others.shapes)
         places = []
         for place in events.places:
@@ -209,31 +214,38 @@ class EventCandidates:
     def averaged(self, taken: Taken, events: ChosenEvents) -> list[tuple[int, Floats, Floats]]:
         """Average each of the chosen events over all shapes, the others as chosen.
 
+        Parameters
+        ----------
+        taken : Taken
+            By what is part of the disturbance beside the events.
+        events : ChosenEvents
+
         Returns
         -------
         list of tuples of int, (S, 3) array and (S, 3) array
             Recording, torque, and its standard deviation over the shapes [N m].
         """
-        found = []
+        averages = []
         for place in events.places:
             beside = taken
             for other, deviation in zip(events.places, events.deviations[::3], strict=True):
                 if other != place:
                     beside = self._with(beside, other, float(deviation))
             gain, vectors, along, visible = self._gains(beside)
-            own = np.flatnonzero(self.recording == self.recording[place])
-            weights = np.exp(gain[own] - logsumexp(gain[own]))
-            means = -along[own] / (1.0 + visible[own]) * self._scales[:, None]  # along the eigenvectors, (k, t, 3)
-            amplitudes = np.einsum("kt,kab,ktb->ka", weights, vectors[own], means)
+            rivals = np.flatnonzero(self.recording == self.recording[place])
+            weights = np.exp(gain[rivals] - logsumexp(gain[rivals]))
+            # along the eigenvectors, (k, t, 3)
+            means = -along[rivals] / (1.0 + visible[rivals]) * self._scales[:, None]
+            amplitudes = np.einsum("kt,kab,ktb->ka", weights, vectors[rivals], means)
             probability = weights.sum(axis=1)
-            courses = np.stack([self.course[k] for k in own])
+            courses = np.stack([self.course[k] for k in rivals])
             torque = courses.T @ amplitudes
             each = np.divide(
                 amplitudes, probability[:, None], out=np.zeros_like(amplitudes), where=probability[:, None] > 0
             )
             square = (courses.T**2) @ (probability[:, None] * each**2)
-            found.append((int(self.recording[place]), torque, np.sqrt(np.maximum(square - torque**2, 0.0))))
-        return found
+            averages.append((int(self.recording[place]), torque, np.sqrt(np.maximum(square - torque**2, 0.0))))
+        return averages
 
     @property
     def _scales(self) -> Floats:
@@ -257,10 +269,10 @@ class EventCandidates:
 
     def _with(self, taken: Taken, place: int, deviation: float) -> Taken:
         """Return what is taken with one more event."""
-        own = slice(3 * place, 3 * place + 3)
-        rest = self.matrix[own] - taken.share[:, own].T @ taken.share
-        score = self.score[own] - taken.share[:, own].T @ taken.pull
-        block = GaussianBlock.of(rest[:, own], np.full(3, deviation))
+        columns = slice(3 * place, 3 * place + 3)
+        rest = self.matrix[columns] - taken.share[:, columns].T @ taken.share
+        score = self.score[columns] - taken.share[:, columns].T @ taken.pull
+        block = GaussianBlock.of(rest[:, columns], np.full(3, deviation))
         return Taken(np.concatenate([taken.share, block.share(rest)]), np.concatenate([taken.pull, block.share(score)]))
 
 

@@ -107,10 +107,16 @@ def torques_beside(
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
 ) -> TorqueReading | TorquesNotRead:
-    """Return what the joint torques say beside a verdict on the motion, see `read_torques`.
+    """Return what the joint torques say beside a verdict on the motion.
 
     Torques depend on the motion of the base. Where something without a name moves it, a torque that the model does not
     have would say no more than the motion did.
+
+    Parameters
+    ----------
+    verdict : ProbableVerdict
+        On the motion.
+    hypothesis, model, prior, rng, bounds, settings : as for `read_torques`
     """
     nameless = any(UNKNOWN in names for names in verdict.ambiguous_with)
     if nameless or verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
@@ -216,7 +222,7 @@ def read_torques(
     named = [name for name in verdict.causes if name in evidence.catalogue]
     change: Floats | float = 0.0
     if named:
-        columns = {item.name: item.columns for item in bank.signatures if item.recording is None}
+        columns = {signature.name: signature.columns for signature in bank.signatures if signature.recording is None}
         posterior = AmplitudePosterior.of(evidence, named)
         change = sum(columns[group] @ posterior.mean[places] for (_, group), places in posterior.amplitudes.items())
     inclusion = probabilities.inclusion
@@ -240,9 +246,9 @@ def _bank(
     for effect, size, end in zip(candidates, sizes, ends, strict=True):
         columns = fitted.columns[:, end - size : end]
         largest = {bound.unit: bound.largest for bound in bounds[effect.label]}
-        found = amplitude_signatures(effect, columns, 1)
-        groups = tuple(AmplitudeGroup(item.name, largest[unit]) for unit, item in found.items())
-        banks.append(SignatureBank(tuple(found.values()), (CandidateCause(effect.label, groups),)))
+        signatures = amplitude_signatures(effect, columns, 1)
+        groups = tuple(AmplitudeGroup(signature.name, largest[unit]) for unit, signature in signatures.items())
+        banks.append(SignatureBank(tuple(signatures.values()), (CandidateCause(effect.label, groups),)))
     channels = fitted.posterior.model.channels
     for place, joint in enumerate(channels.joints, channels.torques.start):
         banks.append(error_signatures(fitted.posterior, f"torque of {joint}", slice(place, place + 1)))

@@ -101,7 +101,7 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         f"{format_number(100.0 * settings.covered)} %, and unresolved if more are needed. It is unknown if candidates "
         "that name nothing hold the majority."
     )
-    if result.held:
+    if result.bodies_fixed:
         yield (
             "Every fit of the present model drove its bodies to where their prior all but excludes them. They are held "
             "at the prior's centre, and what each candidate changes is computed along the motion that the data show."
