@@ -137,21 +137,21 @@ def _written(
         except InputError as error:  # no motion at the prior's centre of the extended model
             yield f"The extended model was not sampled: {error}."
     clock.ends("sample")
-    advice, designed = None, None
+    advice, next_design = None, None
     if rivals:
         progress(1.0, "designing the next manoeuvre")
         try:
-            designed = fly_next(study, rivals, seed, silent)
+            next_design = fly_next(study, rivals, seed, silent)
         except InputError as error:
             advice = f"No manoeuvre was designed that tells {' and '.join(rivals)} apart: {error}."
         else:
-            advice = f"Fly {FILE}, {designed.problem.plan.family.duration:g} s. {separation_sentence(designed)}"
+            advice = f"Fly {FILE}, {next_design.problem.plan.family.duration:g} s. {separation_sentence(next_design)}"
         yield advice
     clock.ends("design")
     with complete_folder(output) as folder:
         result.unexplained.write(folder / "unexplained.csv")
-        if designed is not None:
-            write_motion(designed, folder / FILE)
+        if next_design is not None:
+            write_motion(next_design, folder / FILE)
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
         sample, samples = effective_samples is not None, effective_samples
