@@ -172,7 +172,7 @@ def test_probabilities_of_the_json(small):
     assert set(probability) == {"nothing", "unknown", "causes"}
     assert set(probability["causes"]) >= set(NAMES)
     for item in sets:
-        assert set(item) == {"causes", "generic", "probability", "log_evidence", "refitted"}
+        assert set(item) == {"causes", "generic", "probability", "log_evidence", "refitted", "sizes"}
     assert all(set(row) >= CANDIDATE for row in content["candidates"])
     assert {row["name"] for row in content["candidates"]} >= set(NAMES)
     assert set(content["prior"]) == {"one_more_cause", "generic"}

@@ -32,8 +32,8 @@ from bayesid.diagnosis.noise.noise_fault import FittedFault
 from bayesid.diagnosis.outcome.candidate_table import CauseAmplitude, amplitudes_of
 from bayesid.diagnosis.outcome.cause_sizes import VectorSize, vector_size
 from bayesid.diagnosis.outcome.disturbance import torque_correlations
+from bayesid.diagnosis.outcome.gain import strongest_recording
 from bayesid.diagnosis.outcome.inseparable_causes import cause_cosines
-from bayesid.diagnosis.outcome.model_change import strongest_recording
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
 from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.residual_view import ResidualView

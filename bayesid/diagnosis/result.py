@@ -15,15 +15,15 @@ from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others, instants_of
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
 from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, TorqueCorrelation, torque_correlations
-from bayesid.diagnosis.outcome.gain import Gain
-from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_pairs
-from bayesid.diagnosis.outcome.model_change import (
+from bayesid.diagnosis.outcome.gain import (
+    Gain,
     ParameterChange,
     SimulationError,
     parameter_changes,
     simulation_errors,
     strongest_recording,
 )
+from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_pairs
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.search.model_search import ModelSearch

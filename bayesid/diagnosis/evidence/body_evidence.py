@@ -142,21 +142,20 @@ class _SizedBody:
             a = self.amplitudes(x)
             return float(score @ a + 0.5 * a @ matrix @ a + 0.5 * x @ x)
 
-        damping, here = 1e-2, cost(x)
+        damping, least = 1e-2, cost(x)
         for _ in range(ITERATIONS):
             slope = self.slope(x)
             hessian = slope.T @ matrix @ slope + np.eye(len(x))
             gradient = slope.T @ (score + matrix @ self.amplitudes(x)) + x
             step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
-            there = cost(x + step)
-            if np.isfinite(there) and there <= here:
-                x, damping, change = x + step, 0.2 * damping, here - there
-                here = there
-                if change < 1e-4:
+            trial = cost(x + step)
+            if np.isfinite(trial) and trial <= least:
+                x, damping, gain, least = x + step, 0.2 * damping, least - trial, trial
+                if gain < 1e-4:
                     break
             else:
                 damping *= 8.0
                 if damping > 1e9:
                     break
         slope = self.slope(x)
-        return -here - 0.5 * float(np.linalg.slogdet(slope.T @ matrix @ slope + np.eye(len(x)))[1])
+        return -least - 0.5 * float(np.linalg.slogdet(slope.T @ matrix @ slope + np.eye(len(x)))[1])

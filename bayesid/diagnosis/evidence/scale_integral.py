@@ -36,7 +36,7 @@ from bayesid.diagnosis.evidence.scales import (
     thinning,
 )
 
-__all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_evidences", "log_ratios"]
+__all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_evidences"]
 
 MOST_NODES = 2000  # in the product of all groups but the last, above which the grid is thinned and then narrowed
 COARSE_NODES = 40  # the same for the first grid of large groups, which only finds where the integrand matters
@@ -154,17 +154,8 @@ def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
     return log_evidence
 
 
-def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogNodes]) -> Floats:
-    """Return the logarithm of the evidence relative to nothing at every combination of scales, shape (t1, ..., tk).
-
-    Parameters
-    ----------
-    groups : sequence of GroupSpectrum
-        Of ``k`` groups, in the order in which they are integrated out.
-    gram : Gram
-    nodes : sequence of LogNodes
-        Scales of each group.
-    """
+def _log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogNodes]) -> Floats:
+    """Return the logarithm of the evidence relative to nothing at every combination of scales, shape (t1, ..., tk)."""
     if not groups:
         return np.zeros(())
     first, rest = groups[0], groups[1:]
@@ -221,7 +212,7 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
             group.nodes(thinned if place + 1 < len(groups) else 1.0, part)
             for place, (group, part) in enumerate(zip(groups, parts, strict=True))
         )
-        log_terms = log_ratios(groups, gram, nodes)
+        log_terms = _log_ratios(groups, gram, nodes)
         log_terms = log_terms + reduce(np.add.outer, [np.zeros(()), *(grid.log_weights for grid in nodes)])
         narrower = [_narrowed(grid, axis, log_terms) for axis, grid in enumerate(nodes)]
         if thinned == 1.0 or (narrower == parts and not coarse):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, Frame, Status
 from bayesid.diagnosis.outcome.disturbance import TorqueCorrelation
-from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
+from bayesid.diagnosis.outcome.gain import ParameterChange, SimulationError
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import wrench_sentence

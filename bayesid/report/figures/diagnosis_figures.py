@@ -13,7 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Diagnosis, DisturbingWrench, Frame, Hypothesis
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.diagnosis.outcome.cause_sizes import Z95, vector_size
-from bayesid.diagnosis.outcome.model_change import ParameterChange
+from bayesid.diagnosis.outcome.gain import ParameterChange
 from bayesid.diagnosis.outcome.torque_of_causes import torque_spectrum
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report.figures.figure_style import (
