@@ -187,8 +187,6 @@ def scale_cases(robot: Robot, rng: np.random.Generator) -> tuple[ScaleCase, ...]
 
 
 class _World:
-    """Random states of a robot."""
-
     def __init__(self, robot: Robot, rng: np.random.Generator) -> None:
         self.robot, self.bodies = robot, massive_bodies(robot)
         self.base: BaseParameters = base_parameters(robot)

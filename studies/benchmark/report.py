@@ -42,12 +42,7 @@ def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
 
     return [
         *(
-            (
-                f"time of {name} over that of one evaluation",
-                np.array([run.speedups[name] for run in runs]),
-                goal,
-                True,
-            )
+            (f"time of {name} over that of one evaluation", np.array([run.speedups[name] for run in runs]), goal, True)
             for name, goal in RIVALS.items()
         ),
         ("integration error [σ of a sample]", over(lambda run: run.error), ERROR, False),
@@ -86,13 +81,11 @@ def goals_of(figures: Figures) -> list[Goal]:
 
 
 def _spread(values: Floats) -> str:
-    """Return the median of all runs with the smallest and the largest value."""
     middle, low, high = (format_number(float(f(values)), 3) for f in (np.median, np.min, np.max))
     return f"{middle} ({low} to {high})"
 
 
 def _varies(values: Floats) -> str:
-    """Return the factor between the largest and the smallest value."""
     return format_number(float(values.max() / values.min()), 2)
 
 

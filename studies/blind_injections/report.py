@@ -142,7 +142,6 @@ def _explained_outside(trials: Sequence[Trial]) -> tuple[str, str]:
 
 
 def _failure(alike: Sequence[Trial]) -> str:
-    """Return the sentence on the trials of one case that were answered wrongly in the same way."""
     first = alike[0]
     said = _said(first)
     each = []

@@ -111,7 +111,6 @@ class _First(NamedTuple):
 
 @cache
 def _first(case: Case) -> _First:
-    """Return the data set around which replicates are drawn."""
     rng, model = np.random.default_rng(FIRST_SEED), model_of(case)
     manoeuvre = record(case, draw_truth(model, rng), rng).manoeuvre
     posterior, optimum = maximise(Posterior.of(model, [manoeuvre]), rng)

@@ -217,5 +217,4 @@ def _pose(rotation: Floats, position: Floats) -> Floats:
 
 
 def _turns(before: Floats, after: Floats) -> Floats:
-    """Return the angles between pairs of attitudes [rad]."""
     return np.asarray(Rotation.from_matrix(before[:, :3, :3].transpose(0, 2, 1) @ after[:, :3, :3]).magnitude())

@@ -73,12 +73,7 @@ def determined(base: BaseParameters, equations: Floats) -> Determined:
 
 
 def consistent_accelerations(
-    robot: Robot,
-    motion: Kinematics,
-    rate: Floats,
-    wrench: Floats,
-    zenith: Floats | None = None,
-    gradient: float = 0.0,
+    robot: Robot, motion: Kinematics, rate: Floats, wrench: Floats, zenith: Floats | None = None, gradient: float = 0.0
 ) -> tuple[Floats, Floats]:
     """Return the accelerations of the base under an external wrench, by its six equations of motion.
 

@@ -160,7 +160,6 @@ def _end_with_parent() -> None:
 
 
 def _attempt(function: Trial, task: Any, seed: int, number: int) -> dict[str, Any]:
-    """Return what one trial returned, or what it raised."""
     child = np.random.SeedSequence(seed, spawn_key=(number,))
     try:
         return {"result": function(task, np.random.default_rng(child))}

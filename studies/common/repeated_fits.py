@@ -114,8 +114,6 @@ class Realised:
 
 @dataclass(frozen=True)
 class _Task:
-    """One flight and its fit."""
-
     parameters: tuple[float, ...]
     points: int
     arm_spread: float

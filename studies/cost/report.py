@@ -99,7 +99,6 @@ def _nested(cost: Cost) -> Goal:
 
 
 def _spread(values: Sequence[float]) -> str:
-    """Return the median with the smallest and the largest value [s]."""
     if len(values) < 2:
         return f"{values[0]:.1f} s"
     return f"{np.median(values):.1f} s ({min(values):.1f} to {max(values):.1f})"

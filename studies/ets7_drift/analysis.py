@@ -249,7 +249,6 @@ def _watched(model: Model, result: Diagnosis) -> Posterior:
 
 
 def _simulated(posterior: Posterior, z: Floats) -> list[Floats]:
-    """Return the simulated attitudes of all recordings."""
     return [np.asarray(predicted.attitude) for predicted in predicted_readings(posterior, z)]
 
 

@@ -111,7 +111,6 @@ def _answer(known: str, case: Case) -> str:
 
 
 def _rms(case: Case, name: str) -> float:
-    """Return the root mean square error of one simulation over all recordings [degrees]."""
     return float(np.sqrt(np.mean([attitude.errors[name] ** 2 for attitude in case.attitudes])))
 
 
@@ -158,7 +157,6 @@ def _negatives(document: Document, cases: Cases) -> None:
 
 
 def _failures(known: str, case: Case) -> list[str]:
-    """Return what fails with the base known to so much."""
     verdict, gain = case.diagnosis.verdict, case.diagnosis.gain
     off = (gain.before.bodies.mean[0] / case.world.base[0] - 1.0) * 100.0
     texts = [

@@ -238,7 +238,6 @@ def _tables(result: Result) -> list[CsvTable]:
 
 @styled
 def _repetition_figure(repetitions: Sequence[float], curves: Mapping[tuple[str, bool], Sequence[float]]) -> Figure:
-    """Draw the worst relative standard deviation against the time spent moving."""
     figure = wide_figure(2.7)
     axes = figure.subplots()
     hours = np.array(repetitions) * mission.DURATION / 3600.0

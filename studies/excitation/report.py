@@ -83,7 +83,6 @@ def goals(result: Result) -> tuple[Goal, ...]:
 
 
 def _search_goals(result: Result) -> list[Goal]:
-    """Return the goals of the searches from many starts."""
     starts = f"{STARTS} starts"
     largest = (
         f"Largest factor over (26) that {starts} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
@@ -217,7 +216,6 @@ def _crowds(result: Result) -> str:
 
 
 def _flights(result: Result) -> str:
-    """Return how many flights were made of which designs."""
     counts = {len(realised.errors) for realised in result.realised.values()}
     if len(counts) == 1 and len(result.realised) == len(result.contest.designs):
         return f"{counts.pop()} flights of every design"

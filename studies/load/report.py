@@ -55,7 +55,6 @@ def run(folder: Path, *, full: bool = False, seed: int = 0, progress: Progress =
 
 
 def _goals(result: Result) -> list[Goal]:
-    """Return the goals of the study with what was reached."""
     loop, rows = result.flights["loop"], []
     for name, flight in result.flights.items():
         mass, sd = abs(flight.error(-1)[MASS]), flight.relative(-1)[MASS]
@@ -288,7 +287,6 @@ def _loop_figure(flights: dict[str, Flight]) -> Figure:
 
 @styled
 def _error_figure(iterations: list[Iteration]) -> Figure:
-    """Draw the relative errors of the ten quantities, as printed in the paper and as reached here."""
     figure = wide_figure(2.4)
     axes = figure.subplots()
     place = np.arange(len(LABELS))

@@ -128,7 +128,6 @@ class Planner:
 
     @property
     def _count(self) -> int:
-        """Number of the bodies' coordinates."""
         return 10 * len(self.model.priors)
 
     @cached_property
@@ -160,8 +159,6 @@ STEPS, SMALL = 20, 1e-4
 
 @dataclass(frozen=True)
 class _Task:
-    """One drawn ship."""
-
     parameters: tuple[float, ...]
     arm_spread: float
 

@@ -304,7 +304,6 @@ def refit(task: tuple[str, str], rng: np.random.Generator) -> dict[str, estimato
 
 
 def _likelihood(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, estimators.Solved]:
-    """Fit as the package does."""
     measured, linear = draws.measured_motion(noise), estimators.linearised()
     manoeuvre = Manoeuvre(draws.recording(noise), measured)
     posterior = Posterior.of(model_of(noise, biased=False), [manoeuvre], step=estimators.STEP, flat_prior=True)

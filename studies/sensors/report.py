@@ -92,7 +92,6 @@ def _report(result: Result) -> Report[Result]:
 
 
 def _first(result: Result) -> str:
-    """Return the paper's level of noise."""
     return next(iter(result.levels))
 
 
@@ -117,7 +116,6 @@ def _answer(result: Result) -> str:
 
 
 def _goals(result: Result) -> list[Goal]:
-    """Return the goals."""
     level = _first(result)
     likelihood = {name: spreads[LIKELIHOOD] for name, spreads in result.joints.items()}
     careful = {name: spreads[WITHOUT_JUNCTIONS] for name, spreads in result.joints.items()}

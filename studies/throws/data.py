@@ -268,7 +268,6 @@ def _differenced(recording: Recording) -> tuple[Floats, Floats, Floats, NDArray[
 
 
 def _cross(vector: Floats) -> Floats:
-    """Matrices (T, 3, 3) of the cross product with vectors (T, 3) on the left."""
     return np.cross(vector[:, None, :], np.eye(3)).transpose(0, 2, 1)
 
 

@@ -114,7 +114,6 @@ def _percents(knowledge: Known, *, before: bool = False) -> list[str]:
 
 
 def _goals(result: Result) -> list[Goal]:
-    """Return the goals."""
     system = groups(result.truth)["whole system"]
     goals = []
     for title, case in zip(("motion alone", "joint torques", "a known thrust"), CHIEF, strict=True):
@@ -296,7 +295,6 @@ def _statements(result: Result) -> list[Statement]:
 
 @styled
 def _mass_figure(result: Result) -> Figure:
-    """Draw the widths of four masses before and after, by sensors."""
     figure = wide_figure(2.6)
     axes = figure.subplots()
     knowledge = [_known(result, *case) for case in CHIEF]

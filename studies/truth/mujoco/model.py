@@ -275,13 +275,11 @@ class TruthModel:
         return slope
 
     def _step(self, motion: Motion, time: float, y: Array, h: float) -> Array:
-        """State one step later, its quaternion normalised."""
         y = runge_kutta_step(partial(self._derivative, motion), time, y, h)
         y[3:7] /= np.linalg.norm(y[3:7])
         return y
 
     def _read(self, motion: Motion, time: float, y: Array) -> tuple[Array, ...]:
-        """Row of `Truth` at a time."""
         data, model, nq, count = self.data, self.model, self.model.nq, len(self.joints)
         data.qacc[:] = self._solve(motion, time, y[:nq], y[nq:], time)
         acceleration = data.qacc[self.driven_v[:count]].copy()
