@@ -27,9 +27,9 @@ def namespace(*arrays: Any) -> Any:
 
 def log_sum(values: ArrayLike) -> float:
     """Return the logarithm of the sum of the exponentials of all elements, none of which is NaN or plus infinity."""
-    found = np.asarray(values, dtype=float)
-    largest = float(found.max())
-    return largest + float(np.log(np.exp(found - largest).sum())) if np.isfinite(largest) else largest
+    logarithms = np.asarray(values, dtype=float)
+    largest = float(logarithms.max())
+    return largest + float(np.log(np.exp(logarithms - largest).sum())) if np.isfinite(largest) else largest
 
 
 def log_sums(values: Floats) -> Floats:
@@ -39,5 +39,5 @@ def log_sums(values: Floats) -> Floats:
     terms = values - largest
     np.exp(terms, out=terms)
     with np.errstate(divide="ignore"):
-        found: Floats = np.log(terms.sum(axis=1)) + largest[:, 0]
-    return found
+        sums: Floats = np.log(terms.sum(axis=1)) + largest[:, 0]
+    return sums

@@ -32,7 +32,7 @@ from jax.stages import Compiled
 from bayesid._io.files import complete_file
 from bayesid._math.memory import give_back_memory
 
-__all__ = ["OBTAINED", "QUICKLY", "Describable", "KeptJit", "forget_executables", "kept_jit"]
+__all__ = ["OBTAINED", "QUICKLY", "forget_executables", "kept_jit"]
 
 PACKAGE = __name__.partition(".")[0]
 OBTAINED = "/bayesid/executable"
@@ -48,11 +48,11 @@ NEVER = 1e9
 QUICKLY = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
 """Options of XLA: compilation takes two thirds of the time and a fifth less memory, and the code is as fast."""
 
-_known: WeakSet[KeptJit] = WeakSet()
+_known: WeakSet[_KeptJit] = WeakSet()
 
 
 @runtime_checkable
-class Describable(Protocol):
+class _Describable(Protocol):
     """A static argument that says itself what it is made of."""
 
     def description(self) -> tuple[object, ...] | None:
@@ -60,7 +60,7 @@ class Describable(Protocol):
         ...
 
 
-def kept_jit(static: int = 0) -> Callable[[Callable[..., Any]], KeptJit]:
+def kept_jit(static: int = 0) -> Callable[[Callable[..., Any]], _KeptJit]:
     """Return a decorator that compiles a function as `jax.jit` does and keeps the result in the folder of JAX's cache.
 
     Parameters
@@ -68,7 +68,7 @@ def kept_jit(static: int = 0) -> Callable[[Callable[..., Any]], KeptJit]:
     static : int
         Number of leading arguments that are static.
     """
-    return lambda function: KeptJit(function, static)
+    return lambda function: _KeptJit(function, static)
 
 
 class _BesideTheCache:
@@ -106,7 +106,7 @@ def forget_executables() -> None:
     give_back_memory()
 
 
-class KeptJit:
+class _KeptJit:
     """A compiled function of positional arguments, see `kept_jit`."""
 
     def __init__(self, function: Callable[..., Any], static: int) -> None:
@@ -125,7 +125,8 @@ class KeptJit:
         leaves, tree = jax.tree.flatten(others)
         if any(isinstance(leaf, Tracer) for leaf in leaves):
             return self._jit(*args)  # part of a larger function
-        key = (static, tree, tuple(leaf.aval if isinstance(leaf, jax.Array) else _shape(leaf) for leaf in leaves))
+        shapes = tuple(leaf.aval if isinstance(leaf, jax.Array) else shaped_abstractify(leaf) for leaf in leaves)
+        key = (static, tree, shapes)
         if key not in self._ready:
             with self._obtaining.setdefault(key, Lock()):  # threads that need the same code wait for the first of them
                 if key not in self._ready:
@@ -195,10 +196,6 @@ def _mark_as_used(file: Path) -> None:
         os.utime(file)
 
 
-def _shape(leaf: object) -> Any:
-    return shaped_abstractify(leaf)
-
-
 def _described(value: object) -> str | None:
     """Return a description of a static argument that is the same in every process, None if there is none.
 
@@ -209,14 +206,14 @@ def _described(value: object) -> str | None:
     if isinstance(value, tuple) and type(value) is tuple:
         return _joined("tuple", value)
     if isinstance(value, type):
-        own = value.__module__.partition(".")[0] in (PACKAGE, "builtins")
-        return f"{value.__module__}.{value.__qualname__}" if own else None
+        keyed = value.__module__.partition(".")[0] in (PACKAGE, "builtins")
+        return f"{value.__module__}.{value.__qualname__}" if keyed else None
     name = _described(type(value))
     if name is None:
         return None
     if isinstance(value, Enum):
         return f"{name}.{value.name}"
-    if isinstance(value, Describable):
+    if isinstance(value, _Describable):
         content = value.description()
         return None if content is None else _joined(name, content)
     if isinstance(value, tuple):
@@ -227,8 +224,8 @@ def _described(value: object) -> str | None:
 
 
 def _joined(name: str, parts: tuple[object, ...]) -> str | None:
-    found = [_described(part) for part in parts]
-    return None if None in found else f"{name}({', '.join(str(part) for part in found)})"
+    descriptions = [_described(part) for part in parts]
+    return None if None in descriptions else f"{name}({', '.join(map(str, descriptions))})"
 
 
 @cache

@@ -60,7 +60,14 @@ def hermite(
 ) -> Traceable:
     """Return the cubic at the fraction ``s`` of an interval, given values and slopes at both ends.
 
-    Slopes are derivatives multiplied by the length of the interval.
+    Parameters
+    ----------
+    left, right : array
+        Values at the ends of the interval.
+    left_slope, right_slope : array
+        Derivatives there, multiplied by the length of the interval.
+    s : array
+        Fraction of the interval, from 0 to 1.
     """
     jump = right - left
     return left + s * (

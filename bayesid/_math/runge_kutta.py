@@ -56,7 +56,13 @@ def runge_kutta_step(
 
 
 def stage_inputs(start: G, middle: G, end: G) -> G:
-    """Return the inputs of the derivative at the five stages of a step, leading axis 5."""
+    """Return the inputs of the derivative at the five stages of a step, leading axis 5.
+
+    Parameters
+    ----------
+    start, middle, end
+        Inputs at the beginning, middle and end of the step.
+    """
     return jax.tree.map(lambda *parts: jnp.stack(parts), start, middle, middle, end, end)
 
 

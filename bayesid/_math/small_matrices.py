@@ -15,7 +15,6 @@ __all__ = [
     "inertia_of",
     "inverse",
     "inverse_small",
-    "quaternion_product",
     "quaternion_rate",
     "rotation",
     "rotation_between",
@@ -31,38 +30,76 @@ def rotation(quaternion: Array) -> Array:
     return Rotation.from_quat(quaternion).as_matrix()
 
 
-def quaternion_product(a: Array, b: Array) -> Array:
+def _quaternion_product(a: Array, b: Array) -> Array:
     """Return the product of two quaternions of any norm, which rotates by b and then by a."""
     vector = a[3] * b[:3] + b[3] * a[:3] + cross(a[:3], b[:3])
     return jnp.concatenate([vector, (a[3] * b[3] - a[:3] @ b[:3])[None]])
 
 
 def quaternion_rate(quaternion: Array, rate: Array) -> Array:
-    """Return the time derivative of an attitude, given its angular velocity in the moving axes [rad/s]."""
-    return 0.5 * quaternion_product(quaternion, jnp.concatenate([rate, jnp.zeros(1)]))
+    """Return the time derivative of an attitude, shape (4,) [1/s].
+
+    Parameters
+    ----------
+    quaternion : (4,) array
+        Attitude x, y, z, w.
+    rate : (3,) array
+        Angular velocity in the moving axes [rad/s].
+    """
+    return 0.5 * _quaternion_product(quaternion, jnp.concatenate([rate, jnp.zeros(1)]))
 
 
 def tilted(quaternion: Array, tilt: Array) -> Array:
-    """Return an attitude rotated by a small rotation vector (3,) in its moving axes [rad]."""
+    """Return an attitude rotated by a small vector.
+
+    Parameters
+    ----------
+    quaternion : (4,) array
+        Attitude x, y, z, w.
+    tilt : (3,) array
+        Small rotation vector in the moving axes [rad].
+    """
     small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
-    return quaternion_product(quaternion, small / jnp.linalg.norm(small))
+    return _quaternion_product(quaternion, small / jnp.linalg.norm(small))
 
 
 def turned(quaternion: Array, vector: Array) -> Array:
-    """Return an attitude rotated by a rotation vector (3,) in its moving axes [rad], by a series smooth at zero."""
+    """Return an attitude rotated by a rotation vector, by a series smooth at zero.
+
+    Parameters
+    ----------
+    quaternion : (4,) array
+        Attitude x, y, z, w.
+    vector : (3,) array
+        Rotation vector in the moving axes [rad].
+    """
     square = vector @ vector
     # `tilted` turns by twice the arctangent of half of what it is given
     return tilted(quaternion, vector * (1.0 + square / 12.0 + square**2 / 120.0))
 
 
 def rotation_between(first: Array, second: Array) -> Array:
-    """Return the small rotation vector (3,) from the first attitude to the second, in the axes of the first [rad]."""
-    difference = quaternion_product(first * jnp.array([-1.0, -1.0, -1.0, 1.0]), second)
+    """Return the small rotation vector (3,) from the first attitude to the second, in the axes of the first [rad].
+
+    Parameters
+    ----------
+    first, second : (4,) array
+        Unit quaternions x, y, z, w.
+    """
+    difference = _quaternion_product(first * jnp.array([-1.0, -1.0, -1.0, 1.0]), second)
     return 2.0 * difference[:3] * jnp.sign(difference[3])
 
 
 def solve_small(matrix: Array, right: Array) -> Array:
-    """Solve a small positive-definite system, shapes (n, n) and (n,), by elimination without pivoting."""
+    """Solve a small positive-definite system by elimination without pivoting.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+        Symmetric positive-definite matrix.
+    right : (n,) array
+        Right-hand side.
+    """
     size = len(right)
     rows = [jnp.concatenate([matrix[i], right[i : i + 1]]) for i in range(size)]
     for i in range(size):
@@ -72,7 +109,12 @@ def solve_small(matrix: Array, right: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Return the cross product of two vectors, shape (3,)."""
+    """Return the cross product of two vectors, shape (3,).
+
+    Parameters
+    ----------
+    a, b : (3,) array
+    """
     return jnp.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 

@@ -31,11 +31,18 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> lis
     """Return the results of a function for some items, in their order.
 
     NumPy's factorisations leave other threads alone; what lies between them runs in one thread at a time.
+
+    Parameters
+    ----------
+    function : callable
+        Function of one argument.
+    items : iterable
+        Arguments.
     """
     items = list(items)
     count = min(len(items), _cores())
     if count < 2:
-        return [function(item) for item in items]
+        return [function(one) for one in items]
     with ThreadPoolExecutor(count) as pool:
         return list(pool.map(function, items))
 

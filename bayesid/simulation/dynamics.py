@@ -193,13 +193,19 @@ def simulate(
 def trace(
     grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array], points: Array
 ) -> tuple[Instant, Samples]:
-    """Return the motion at all integration nodes and midpoints, leading axis 2 K + 1, and at the samples."""
+    """Return the motion at all integration nodes and midpoints, leading axis 2 K + 1, and at the samples.
+
+    Parameters
+    ----------
+    grid, inertial, start, effects, values, points
+        As of `simulate`.
+    """
     system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
     steps = len(grid.step)
     index = jnp.minimum(jnp.arange(2 * steps + 1) // 2, steps - 1)
     fraction = jnp.concatenate([jnp.tile(jnp.array([0.0, 0.5]), steps), jnp.ones(1)])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
-    motion = jax.vmap(system.motion)(
+    motion = jax.vmap(system._motion)(
         trajectory.at(index, fraction), (bodies, grid.node.environment), grid.zero_order_hold[index]
     )
     return motion[0], _sample(grid, points, system, loads, trajectory)
@@ -252,12 +258,12 @@ def linearise(
     system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
     nothing = jnp.zeros(INPUTS)
 
-    def pushed(row: Array, environment: Environment, push: Array) -> tuple[Composite, Environment]:
-        acting = environment._replace(wrench=environment.wrench + push[WIDTH:])
-        return composite(row + push[:WIDTH]), acting
+    def perturbed(row: Array, environment: Environment, perturbation: Array) -> tuple[Composite, Environment]:
+        acting = environment._replace(wrench=environment.wrench + perturbation[WIDTH:])
+        return composite(row + perturbation[:WIDTH]), acting
 
-    def slope(state: Array, push: Array, row: Array, environment: Environment, hold: Array) -> Array:
-        return system.derivative(state, pushed(row, environment, push), hold)
+    def slope(state: Array, perturbation: Array, row: Array, environment: Environment, hold: Array) -> Array:
+        return system.derivative(state, perturbed(row, environment, perturbation), hold)
 
     def stages(state: Array, size: Array, hold: Array, *nodes: tuple[Array, Environment]) -> tuple[Array, Array]:
         inputs = stage_inputs(*nodes)
@@ -265,12 +271,12 @@ def linearise(
         both = jax.vmap(jax.jacfwd(slope, argnums=(0, 1)), (0, None, 0, 0, None))
         return both(states, nothing, *inputs, hold)
 
-    def beginning(push: Array) -> Array:
-        at = pushed(rows[0], jax.tree.map(lambda x: x[0], grid.node.environment), push)
+    def initial(perturbation: Array) -> Array:
+        at = perturbed(rows[0], jax.tree.map(lambda x: x[0], grid.node.environment), perturbation)
         return system.initial(at, start, _spin_error(grid.unit_speed, loads, start))
 
-    def sampled(state: Array, push: Array, row: Array, hold: Array, tables: TimeTables) -> Array:
-        return read(system.sample(state, pushed(row, tables.environment, push), hold, points, tables, loads))
+    def sampled(state: Array, perturbation: Array, row: Array, hold: Array, tables: TimeTables) -> Array:
+        return read(system.sample(state, perturbed(row, tables.environment, perturbation), hold, points, tables, loads))
 
     rows = grid.node.known + grid.node.unknown @ loads
     nodes = (rows, grid.node.environment)
@@ -288,7 +294,7 @@ def linearise(
         at[0], nothing, *at[1:]
     )
     reading = jax.vmap(sampled, (0, None, 0, 0, 0))(at[0], nothing, *at[1:])
-    return LinearMotion(by_state, by_input, jax.jacfwd(beginning)(nothing), reading_state, reading_input, reading)
+    return LinearMotion(by_state, by_input, jax.jacfwd(initial)(nothing), reading_state, reading_input, reading)
 
 
 class _StateTrajectory(NamedTuple):
@@ -310,8 +316,8 @@ def _integrate(
 ) -> tuple[System, Array, _StateTrajectory]:
     """Return the system, the factors of its tables, and its trajectory by the classical Runge-Kutta method."""
     system = System(tuple(effects), tuple(values))
-    more = [effect.body_loads(v, inertial) for effect, v in zip(effects, values, strict=True)]
-    loads = jnp.concatenate([inertial, *more])
+    pairs = zip(effects, values, strict=True)
+    loads = jnp.concatenate([inertial, *(effect.body_loads(v, inertial) for effect, v in pairs)])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
     nodes = (bodies, grid.node.environment)
     first, middle, last = (
@@ -375,24 +381,44 @@ class System(NamedTuple):
     values: tuple[Array, ...]
 
     def initial(self, given: tuple[Composite, Environment], start: Start, spin_error: Array) -> Array:
-        """Return the state at time 0."""
+        """Return the state at time 0.
+
+        Parameters
+        ----------
+        given : tuple of Composite and Environment
+            Composite body and environment at time 0.
+        start : Start
+            Attitude and rate at time 0.
+        spin_error : (3,) array
+            Spurious angular momentum by errors of the joint speeds [N m s].
+        """
         body, environment = given
         inner = jnp.zeros(sum(effect.states + 2 * effect.modes_count for effect in self.effects))
         instant = Instant(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
-        momentum = body.inertia @ start.rate + body.spin - spin_error + self.momentum(instant, inner)[0]
+        momentum = body.inertia @ start.rate + body.spin - spin_error + self._momentum(instant, inner)[0]
         return jnp.concatenate([start.attitude, momentum, inner])
 
     def derivative(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> Array:
-        """Return the derivative of the state by time."""
+        """Return the derivative of the state by time.
+
+        Parameters
+        ----------
+        state : (n,) array
+            Attitude, angular momentum and inner states.
+        given : tuple of Composite and Environment
+            Composite body and environment at the instant.
+        hold : (6,) array
+            Known force and torque on the base, base axes [N, N m].
+        """
         if any(effect.modes_count for effect in self.effects):
-            instant, mode_changes = self.motion(state, given, hold)
+            instant, mode_changes = self._motion(state, given, hold)
         else:  # the acceleration is not needed
-            instant, mode_changes = self.instant(state, given)[0], jnp.zeros(0)
-        wrench = self.wrench(instant, state[INNER], hold)
+            instant, mode_changes = self._instant(state, given)[0], jnp.zeros(0)
+        wrench = self._wrench(instant, state[INNER], hold)
         torque = wrench.torque - cross(instant.body.com, wrench.force)
         parts = [quaternion_rate(state[ATTITUDE], instant.rate), torque - cross(instant.rate, state[MOMENTUM])]
         used = 0
-        for effect, values, states, _, speed in self.inner(state[INNER]):
+        for effect, values, states, _, speed in self._inner(state[INNER]):
             if effect.states:
                 parts.append(effect.derivative(values, instant, states))
             if effect.modes_count:
@@ -409,30 +435,42 @@ class System(NamedTuple):
         tables: TimeTables,
         loads: Array,
     ) -> Samples:
-        """Return the motion at a sample, as `Samples` has it."""
-        instant, _ = self.motion(state, given, hold)
+        """Return the motion at a sample, as `Samples` has it.
+
+        Parameters
+        ----------
+        state, given, hold
+            As of `derivative`.
+        points : (K, 3) array
+            Mounting points of the sensors in the base [m].
+        tables : TimeTables
+            Tables of the sample.
+        loads : (p,) array
+            Factors of the columns of its unknown tables.
+        """
+        instant, _ = self._motion(state, given, hold)
         added = jnp.zeros_like(points)
-        for effect, values, *_ in self.inner(state[INNER]):
+        for effect, values, *_ in self._inner(state[INNER]):
             if effect.uses("specific_force"):
                 force = jax.vmap(effect.specific_force, (None, None, 0))
                 added = added + force(values, instant, points - instant.body.com)
         motion = BaseMotion(instant.rate, instant.rate_change, instant.acceleration)
-        tensor = self.gravity_gradient_tensor(instant)
+        tensor = self._gravity_gradient_tensor(instant)
         torque = joint_torques(tables.beyond, tables.unknown, loads, motion, instant.body.com, tensor)
         quaternion = state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE])
         return Samples(instant, quaternion, added, torque)
 
-    def motion(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> tuple[Instant, Array]:
+    def _motion(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> tuple[Instant, Array]:
         """Return the instant with the accelerations of the base, and those of the modes' amplitudes."""
-        instant, momentum_rate = self.instant(state, given)
+        instant, momentum_rate = self._instant(state, given)
         body, rate = instant.body, instant.rate
-        wrench = self.wrench(instant, state[INNER], hold)
+        wrench = self._wrench(instant, state[INNER], hold)
         torque = wrench.torque - cross(body.com, wrench.force)
         change = torque - cross(rate, state[MOMENTUM]) - body.inertia_rate @ rate - body.spin_rate - momentum_rate
         force = wrench.force
-        moving = [item for item in self.inner(state[INNER]) if item.effect.modes_count]
-        for item in moving:
-            flow = item.effect.modes(item.values).linear.T @ item.speed
+        vibrating = [part for part in self._inner(state[INNER]) if part.effect.modes_count]
+        for part in vibrating:
+            flow = part.effect.modes(part.values).linear.T @ part.speed
             change = change + cross(body.com_rate, flow)
             force = force - 2.0 * cross(rate, flow)
         rate_change = body.inverse @ change
@@ -443,15 +481,15 @@ class System(NamedTuple):
             - cross(rate_change, body.com)
             - cross(rate, cross(rate, body.com))
         )
-        if not moving:
+        if not vibrating:
             return instant._replace(rate_change=rate_change, acceleration=acceleration), jnp.zeros(0)
-        modes = [item.effect.modes(item.values) for item in moving]
+        modes = [part.effect.modes(part.values) for part in vibrating]
         linear = jnp.concatenate([mode.linear for mode in modes])
         central = jnp.concatenate([_about_com(mode, body.com) for mode in modes])
         free = jnp.concatenate(
             [
-                -2.0 * mode.damping * mode.omega * item.speed - mode.omega**2 * item.amplitude
-                for mode, item in zip(modes, moving, strict=True)
+                -2.0 * mode.damping * mode.omega * part.speed - mode.omega**2 * part.amplitude
+                for mode, part in zip(modes, vibrating, strict=True)
             ]
         )
         spread = jnp.outer(rate, rate) - (rate @ rate) * jnp.eye(3)  # w x (w x r) as a matrix
@@ -469,17 +507,17 @@ class System(NamedTuple):
             acceleration=acceleration - linear.T @ changes / body.mass + cross(recoil, body.com),
         ), changes
 
-    def instant(self, state: Array, given: tuple[Composite, Environment]) -> tuple[Instant, Array]:
+    def _instant(self, state: Array, given: tuple[Composite, Environment]) -> tuple[Instant, Array]:
         """Return the instant without accelerations, and the derivative of the relative momentum."""
         body, environment = given
         still = Instant(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
-        momentum, momentum_rate = self.momentum(still, state[INNER])
+        momentum, momentum_rate = self._momentum(still, state[INNER])
         return still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum)), momentum_rate
 
-    def momentum(self, instant: Instant, inner: Array) -> tuple[Array, Array]:
+    def _momentum(self, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum relative to the base about the centre of mass, and its derivative without modes."""
         momentum, rate = instant.environment.wheel_momentum, instant.environment.wheel_torque
-        for effect, values, states, _, speed in self.inner(inner):
+        for effect, values, states, _, speed in self._inner(inner):
             if effect.uses("momentum"):
                 more, more_rate = effect.momentum(values, instant, states)
                 momentum, rate = momentum + more, rate + more_rate
@@ -487,17 +525,17 @@ class System(NamedTuple):
                 momentum = momentum + _about_com(effect.modes(values), instant.body.com).T @ speed
         return momentum, rate
 
-    def wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
+    def _wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
         """Return the force and its torque about the base origin."""
         given = hold + instant.environment.wrench
         total = Wrench(given[:3], given[3:])
-        for effect, values, states, *_ in self.inner(inner):
+        for effect, values, states, *_ in self._inner(inner):
             if effect.uses("wrench"):
                 more = effect.wrench(values, instant, states)
                 total = Wrench(total.force + more.force, total.torque + more.torque)
         return total
 
-    def gravity_gradient_tensor(self, instant: Instant) -> Array:
+    def _gravity_gradient_tensor(self, instant: Instant) -> Array:
         """Return the gravity-gradient tensor of all effects, shape (3, 3) [1/s2]."""
         parts = zip(self.effects, self.values, strict=True)
         return sum(
@@ -505,7 +543,7 @@ class System(NamedTuple):
             jnp.zeros((3, 3)),
         )
 
-    def inner(self, inner: Array) -> list[_Inner]:
+    def _inner(self, inner: Array) -> list[_Inner]:
         """Return every effect with its parameters and its part of the inner states."""
         parts, start = [], 0
         for effect, values in zip(self.effects, self.values, strict=True):

@@ -81,7 +81,15 @@ class Beyond(NamedTuple):
 
 
 def no_joints(count: int, columns: int) -> Beyond:
-    """Return an empty `Beyond` at ``count`` instants, for models without torque sensors."""
+    """Return an empty `Beyond` at ``count`` instants, for models without torque sensors.
+
+    Parameters
+    ----------
+    count : int
+        Number of instants.
+    columns : int
+        Number of columns of the unknown tables.
+    """
     return Beyond(*(np.zeros((count, *shape)) for shape in ((0, WIDTH), (0, columns), (0, 6), (0,))))
 
 

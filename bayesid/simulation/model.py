@@ -163,7 +163,16 @@ class Model:
 
 
 def spread_links(robot: Robot, spread: float, known: Sequence[str]) -> tuple[BodyPrior, ...]:
-    """Return priors of the given relative width for all links with mass except those in ``known``, to marginalise."""
+    """Return priors of the given relative width for all links with mass except those in ``known``, to marginalise.
+
+    Parameters
+    ----------
+    robot : Robot
+    spread : float
+        Relative width of the priors; there are none for zero.
+    known : sequence of str
+        Links that get no prior.
+    """
     if spread <= 0.0:
         return ()
     return tuple(

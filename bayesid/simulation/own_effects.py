@@ -59,7 +59,7 @@ def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) ->
     trial = (EffectKey(effect), robot.name, len(robot.joints), tuple(sensor.kind for sensor in sensors))
     if trial in _PASSED:
         return
-    for hook, call, wanted in _trials(effect, robot, sensors):
+    for hook, call, expected in _trials(effect, robot, sensors):
         if not effect.uses(hook):
             continue
         try:
@@ -68,8 +68,8 @@ def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) ->
             message = str(error).partition("\n")[0]
             raise _fault(effect, hook, f"it fails: {type(error).__name__}: {message}") from error
         shapes = jax.tree.map(np.shape, result)
-        if wanted is not None and shapes != wanted:
-            raise _fault(effect, hook, f"it returns the shape {shapes} where {wanted} is due")
+        if expected is not None and shapes != expected:
+            raise _fault(effect, hook, f"it returns the shape {shapes} where {expected} is due")
         if not all(np.isfinite(np.asarray(leaf)).all() for leaf in jax.tree.leaves(result)):
             raise _fault(effect, hook, "it returns numbers that are not finite")
     _PASSED.add(trial)

@@ -180,8 +180,8 @@ class SensorKind:
     @property
     def section(self) -> str:
         """Section of a study file that declares a sensor of this kind."""
-        own = type(self).__module__ != __name__
-        return f"sensors.other.{self.value}" if own else f"sensors.{self.value}"
+        shipped = type(self).__module__ == __name__
+        return f"sensors.{self.value}" if shipped else f"sensors.other.{self.value}"
 
     @property
     def is_difference(self) -> bool:
@@ -203,15 +203,37 @@ class SensorKind:
         raise NotImplementedError
 
     def residual(self, measured: Array, predicted: Array) -> Array:
-        """Return a measured less a predicted reading, shape (size,)."""
+        """Return a measured less a predicted reading, shape (size,).
+
+        Parameters
+        ----------
+        measured, predicted : (axes,) array
+            Readings at one instant, in the unit of the kind.
+        """
         return measured - predicted
 
     def noisy(self, readings: Floats, noise: Floats) -> Floats:
-        """Return readings (..., axes) with noise (..., size) of the residual added."""
+        """Return readings (..., axes) with noise (..., size) of the residual added.
+
+        Parameters
+        ----------
+        readings : (..., axes) array
+            Readings without noise.
+        noise : (..., size) array
+            Noise of the residual.
+        """
         return readings + noise
 
     def shown(self, readings: Floats, reference: Floats) -> Floats:
-        """Return readings (n, axes) as figures draw them, (n, size), some relative to a reference reading (axes,)."""
+        """Return readings (n, axes) as figures draw them, (n, size), some relative to a reference reading (axes,).
+
+        Parameters
+        ----------
+        readings : (n, axes) array
+            Readings of one sensor.
+        reference : (axes,) array
+            Reading to which some kinds refer the others.
+        """
         return readings
 
     def __eq__(self, other: object) -> bool:

@@ -103,7 +103,19 @@ class Simulator:
     def readings(
         self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
     ) -> tuple[Readings, Array, Array]:
-        """Return the readings of the sensors (R, T, ...), sensor axes, and the attitude and rate of the base."""
+        """Return the readings of the sensors (R, T, ...), sensor axes, and the attitude and rate of the base.
+
+        Parameters
+        ----------
+        constants : ModelConstants
+            Numbers of the model.
+        values : Values
+            Physical values of the unknowns.
+        grid : Grid
+            Grids of R recordings.
+        attitude : (R, 4) array
+            Initial attitudes, quaternions x, y, z, w.
+        """
 
         def one(values: Values, grid: Grid, attitude: Array) -> tuple[Readings, Array, Array]:
             samples = simulate(*self._arguments(constants, values, grid, attitude))
@@ -114,7 +126,13 @@ class Simulator:
     def trace(
         self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
     ) -> tuple[Instant, Instant, Readings]:
-        """Return the motion at the integration nodes and at the samples, and the readings of the sensors."""
+        """Return the motion at the integration nodes and at the samples, and the readings of the sensors.
+
+        Parameters
+        ----------
+        constants, values, grid, attitude
+            As of `readings`.
+        """
 
         def one(values: Values, grid: Grid, attitude: Array) -> tuple[Instant, Instant, Readings]:
             node, samples = trace(*self._arguments(constants, values, grid, attitude))
@@ -123,14 +141,22 @@ class Simulator:
         return jax.vmap(one, (self._axes, 0, 0))(values, grid, attitude)
 
     def residual(self, readings: Readings, measured: Readings) -> Array:
-        """Return measured less predicted readings in the columns of `Channels`, (R, T, C)."""
+        """Return measured less predicted readings in the columns of `Channels`, (R, T, C).
+
+        Parameters
+        ----------
+        readings : Readings
+            Predicted readings (R, T, ...).
+        measured : Readings
+            Measured readings of the same shapes.
+        """
         parts = []
         for kind in self.channels.kinds:
             differ = jax.vmap(jax.vmap(kind.residual))
             parts.append(differ(measured.channels[kind.value], readings.channels[kind.value]))
-        return jnp.concatenate([*parts, measured.torque - self.measured_torques(readings)], axis=-1)
+        return jnp.concatenate([*parts, measured.torque - self._measured_torques(readings)], axis=-1)
 
-    def measured_torques(self, readings: Readings) -> Array:
+    def _measured_torques(self, readings: Readings) -> Array:
         """Return the predicted torques of the joints with a torque sensor, shape (R, T, n)."""
         if not self.torques:
             return jnp.zeros((*readings.time.shape, 0))
@@ -150,7 +176,13 @@ class Simulator:
         return grid, values.inertial, start, self.effects(constants), values.effects, constants.point
 
     def linearise(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> LinearMotion:
-        """Linearise the simulation in what may act from outside; raw readings are those of `faulty`'s argument."""
+        """Linearise the simulation in what may act from outside; raw readings are those of `faulty`'s argument.
+
+        Parameters
+        ----------
+        constants, values, grid, attitude
+            As of `readings`.
+        """
 
         def one(values: Values, grid: Grid, attitude: Array) -> LinearMotion:
             return partial(linearise, read=partial(self.reading, constants))(
@@ -160,12 +192,32 @@ class Simulator:
         return jax.lax.map(lambda given: one(*given), (self._repeated(values, len(attitude)), grid, attitude))
 
     def reading(self, constants: ModelConstants, sample: Samples) -> Array:
-        """Return the raw readings (q,) of sensors without a fault at one instant, one sensor after the other."""
+        """Return the raw readings (q,) of sensors without a fault at one instant, one sensor after the other.
+
+        Parameters
+        ----------
+        constants : ModelConstants
+            Numbers of the model.
+        sample : Samples
+            Motion at one instant, without the leading axis.
+        """
         alone = jax.tree.map(lambda x: x[None], sample)
         return jnp.concatenate([part[0] for part in self._raw(constants, alone)])
 
     def faulty(self, constants: ModelConstants, values: Values, grid: Grid, raw: Array) -> Readings:
-        """Return the readings of sensors without a fault, (R, T, q), with the faults that effects add; no torques."""
+        """Return the readings of sensors without a fault, (R, T, q), with the faults that effects add; no torques.
+
+        Parameters
+        ----------
+        constants : ModelConstants
+            Numbers of the model.
+        values : Values
+            Physical values of the unknowns.
+        grid : Grid
+            Grids of R recordings.
+        raw : (R, T, q) array
+            Readings without a fault, one sensor after the other.
+        """
 
         def one(values: Values, grid: Grid, raw: Array) -> Readings:
             ends = np.cumsum([len(kind.rest) for kind in self.channels.kinds])
@@ -189,7 +241,7 @@ class Simulator:
 
     def _raw(self, constants: ModelConstants, samples: Samples) -> list[Array]:
         """Return the readings of each sensor without a fault, sensor axes."""
-        found = []
+        readings = []
         for index, kind in enumerate(self.channels.kinds):
             sensed = Sensed(
                 samples.instant,
@@ -198,14 +250,14 @@ class Simulator:
                 samples.specific_force[:, index],
             )
             reading = jax.vmap(kind.read)(sensed)
-            found.append(reading @ constants.rotation[index] if kind.mounted else reading)
-        return found
+            readings.append(reading @ constants.rotation[index] if kind.mounted else reading)
+        return readings
 
     def _with_faults(
         self, constants: ModelConstants, values: Values, grid: Grid, raw: Sequence[Array], torque: Array
     ) -> Readings:
         """Return the readings of one recording with the faults and friction that effects add."""
-        channels = {kind.value: own for kind, own in zip(self.channels.kinds, raw, strict=True)}
+        channels = {kind.value: reading for kind, reading in zip(self.channels.kinds, raw, strict=True)}
         readings = Readings(grid.sample.environment.time, channels, torque)
         for effect, parameters in zip(self.effects(constants), values.effects, strict=True):
             readings = effect.read(parameters, readings)

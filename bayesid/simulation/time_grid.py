@@ -133,7 +133,17 @@ def time_tables(
     actions: Actions | None = None,
     torques: bool = False,
 ) -> TimeTables:
-    """Return the kinematic tables at the times (T,); parameters as of `build_grid`."""
+    """Return the kinematic tables at some times.
+
+    Parameters
+    ----------
+    robot, unknown, effects, motion
+        As of `build_grid`.
+    time : (T,) array
+        Instants of the tables [s].
+    orbit, argument_of_latitude, actions, torques
+        As of `build_grid`.
+    """
     actions = Actions.none() if actions is None else actions
     joints = motion.evaluate(time)
     moved = kinematics(robot, joints)
@@ -171,7 +181,15 @@ def rounded(length: int) -> int:
 
 
 def pad_grids(grids: Sequence[Grid], steps: int | None = None, samples: int | None = None) -> Grid:
-    """Return grids stacked to shape (R, ...), padded with steps of zero length and copies of the last sample."""
+    """Return grids stacked to shape (R, ...), padded with steps of zero length and copies of the last sample.
+
+    Parameters
+    ----------
+    grids : sequence of Grid
+        Grids of R recordings.
+    steps, samples : int, optional
+        Common numbers of steps and samples, by default the largest ones.
+    """
     steps = max(len(grid.step) for grid in grids) if steps is None else steps
     samples = max(len(grid.step_of) for grid in grids) if samples is None else samples
     padded = [
@@ -190,6 +208,14 @@ def pad_grids(grids: Sequence[Grid], steps: int | None = None, samples: int | No
 
 
 def lengthened(array: Traceable, length: int) -> Floats:
-    """Return an array with its last row repeated up to a length."""
+    """Return an array with its last row repeated up to a length.
+
+    Parameters
+    ----------
+    array : (n, ...) array
+        Array with at least one row.
+    length : int
+        Number of rows of the result, at least n.
+    """
     values = np.asarray(array)
     return np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)])

@@ -45,7 +45,15 @@ class Slopes(NamedTuple):
     given: Array
 
     def along(self, state: Array, row: Array) -> Array:
-        """Return the changes (T, m, d) along d directions of states (T, n, d) and rows (T, 28, d)."""
+        """Return the changes (T, m, d) along d directions of states (T, n, d) and rows (T, 28, d).
+
+        Parameters
+        ----------
+        state : (T, n, d) array
+            Changes of the states.
+        row : (T, 28, d) array
+            Changes of the rows.
+        """
         return self.state @ state + self.row @ row
 
 
@@ -65,19 +73,52 @@ class Equations:
     points: Array
 
     def loads(self, inertial: Array, values: Sequence[Array]) -> Array:
-        """Return the coefficients of the columns of the tables, shape (p,)."""
+        """Return the coefficients of the columns of the tables, shape (p,).
+
+        Parameters
+        ----------
+        inertial : (10 B,) array
+            Linear inertial parameters of B unknown bodies.
+        values : sequence of (p,) arrays
+            Parameters of each effect.
+        """
         pairs = zip(self.effects, values, strict=True)
-        return jnp.concatenate([inertial, *(effect.body_loads(own, inertial) for effect, own in pairs)])
+        return jnp.concatenate([inertial, *(effect.body_loads(v, inertial) for effect, v in pairs)])
 
     def initial(self, row: Array, tables: TimeTables, start: Start, values: Sequence[Array]) -> Array:
-        """Return the state at time 0, for the row (28,) there."""
+        """Return the state at time 0, shape (n,).
+
+        Parameters
+        ----------
+        row : (28,) array
+            Row of the composite body at time 0.
+        tables : TimeTables
+            Tables, the first of them at time 0.
+        start : Start
+            Attitude and rate at time 0.
+        values : sequence of (p,) arrays
+            Parameters of each effect.
+        """
         environment = jax.tree.map(lambda x: jnp.asarray(x)[0], tables.environment)
         return self._system(values).initial((composite(row), environment), start, jnp.zeros(3))
 
     def states(self, step: Array, rows: Array, tables: TimeTables, initial: Array, values: tuple[Array, ...]) -> Array:
-        """Return the states (T, n) at nodes and midpoints of K steps of length ``step``, by Runge-Kutta's method.
+        """Return the states (T, n) at nodes and midpoints of K steps, by Runge-Kutta's method.
 
         Derivatives with respect to all arguments follow from the linear recursion, to the order of the method.
+
+        Parameters
+        ----------
+        step : (K,) array
+            Lengths of the steps [s].
+        rows : (T, 28) array
+            Rows of the composite body at T = 2 K + 1 instants.
+        tables : TimeTables
+            Tables at these instants.
+        initial : (n,) array
+            State at time 0.
+        values : tuple of (p,) arrays
+            Parameters of each effect.
         """
         fixed, begin = jax.lax.stop_gradient((rows, tables, values)), jax.lax.stop_gradient(initial)
         plain = self._integrated(step, begin, *fixed)
@@ -102,26 +143,55 @@ class Equations:
     ) -> tuple[Array, Slopes, Slopes]:
         """Return a quantity (T, m) of the motion, and the local derivatives of the states' rates of change and of it.
 
-        The quantity is a function of the motion at an instant and of whatever else is ``given`` there, shape (T, g).
+        Parameters
+        ----------
+        states : (T, n) array
+            States at the instants.
+        rows : (T, 28) array
+            Rows of the composite body.
+        tables : TimeTables
+            Tables at the instants.
+        values : tuple of (p,) arrays
+            Parameters of each effect.
+        quantity : callable
+            Function of the motion at an instant and of what is given there that returns m numbers.
+        given : (T, g) array
+            Whatever else the quantity depends on.
         """
 
-        def local(state: Array, row: Array, own: tuple[Array, ...], more: Array, at: TimeTables) -> tuple[Array, Array]:
-            system = self._system(own)
+        def local(
+            state: Array, row: Array, values: tuple[Array, ...], given: Array, at: TimeTables
+        ) -> tuple[Array, Array]:
+            system = self._system(values)
             at_instant = (composite(row), at.environment)
             rate = system.derivative(state, at_instant, jnp.zeros(6))
             sample = system.sample(state, at_instant, jnp.zeros(6), self.points, at, loads)
-            value = quantity(sample, more)
+            value = quantity(sample, given)
             return jnp.concatenate([rate, value]), value
 
         loads = jnp.zeros(tables.unknown.shape[2])  # of the torques of joints, of which a plan has none
         local_slopes = jax.jacrev(local, argnums=(0, 1, 2, 3), has_aux=True)
-        (state, row, own, more), value = jax.vmap(local_slopes, (0, 0, None, 0, 0))(states, rows, values, given, tables)
-        merged = jnp.concatenate(own, axis=-1) if own else jnp.zeros((*row.shape[:2], 0))
-        both, count = (state, row, merged, more), states.shape[1]
-        return value, Slopes(*(part[:, :count] for part in both)), Slopes(*(part[:, count:] for part in both))
+        (by_state, by_row, by_effect, by_given), value = jax.vmap(local_slopes, (0, 0, None, 0, 0))(
+            states, rows, values, given, tables
+        )
+        by_values = jnp.concatenate(by_effect, axis=-1) if by_effect else jnp.zeros((*by_row.shape[:2], 0))
+        slopes, count = (by_state, by_row, by_values, by_given), states.shape[1]
+        return value, Slopes(*(part[:, :count] for part in slopes)), Slopes(*(part[:, count:] for part in slopes))
 
     def samples(self, states: Array, rows: Array, tables: TimeTables, values: tuple[Array, ...]) -> Samples:
-        """Return the motion at all instants."""
+        """Return the motion at all instants.
+
+        Parameters
+        ----------
+        states : (T, n) array
+            States at the instants.
+        rows : (T, 28) array
+            Rows of the composite body.
+        tables : TimeTables
+            Tables at the instants.
+        values : tuple of (p,) arrays
+            Parameters of each effect.
+        """
         system, loads = self._system(values), jnp.zeros(tables.unknown.shape[2])
 
         def one(state: Array, row: Array, at: TimeTables) -> Samples:

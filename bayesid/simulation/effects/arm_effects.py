@@ -23,7 +23,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBoun
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
 
-__all__ = ["LinkInertia", "LinkMoments", "Payload"]
+__all__ = ["LinkInertia", "Payload"]
 
 CHANGES = (
     Quantity("mass", "kg"),
@@ -113,7 +113,7 @@ class _OnLink(Placed):
         return jnp.asarray(self.factor), jnp.asarray(self.vector)
 
 
-class LinkMoments(Placed):
+class _LinkMoments(Placed):
     """Change of a link's mass, first moment and inertia about the link's origin, in which the motion is linear.
 
     Nothing keeps the changed link a physical body. The scale of each parameter is that of the link itself.
@@ -127,8 +127,8 @@ class LinkMoments(Placed):
         extent = float(np.sqrt(np.abs(np.asarray(vector)[[4, 6, 9]]).max() / mass))
         powers = {"kg": 0, "kg m": 1, "kg m2": 2}
         self.parameters = tuple(
-            Parameter(item.name, item.unit, effect.spread * mass * extent ** powers[item.unit])
-            for item in LINEAR_CHANGES
+            Parameter(moment.name, moment.unit, effect.spread * mass * extent ** powers[moment.unit])
+            for moment in LINEAR_CHANGES
         )
 
     @property
@@ -176,7 +176,7 @@ class Payload(_OnLink):
 
     def in_amplitudes(self) -> Effect:
         """Return the effect with the changes of the ten linear parameters as parameters."""
-        return LinkMoments(self)
+        return _LinkMoments(self)
 
     def amplitudes(self, values: Array) -> Array:
         """Return the changes of the ten linear parameters."""

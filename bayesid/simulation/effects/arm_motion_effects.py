@@ -22,7 +22,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBoun
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
-__all__ = ["Displaced", "DisplacedMotion", "EncoderOffset", "JointFlexibility", "JointLatency"]
+__all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
 
 LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE = 0.1, 0.05
 """Largest plausible error of a joint's zero [rad, m]; assumed, since the eye would see more."""
@@ -37,7 +37,7 @@ OFFSET_STEP = 0.02
 """Joint offset at which the tables are sampled for a quadratic [rad or m], with an error below 1e-5 at 0.03 rad."""
 
 
-class DisplacedMotion(Effect):
+class _DisplacedMotion(Effect):
     """Effect that displaces links against the recorded motion.
 
     It changes the tables of all bodies that the links carry. The tables of bodies with unknown parameters change in
@@ -50,7 +50,7 @@ class DisplacedMotion(Effect):
         """Return the effect wherever it can occur, and nowhere in a model with torque sensors."""
         return [] if model.torque is not None else super().instances(model)
 
-    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the change of the links' motion at T instants."""
         raise NotImplementedError
 
@@ -79,7 +79,7 @@ class DisplacedMotion(Effect):
 
 
 @register
-class EncoderOffset(DisplacedMotion, OnJoint):
+class EncoderOffset(_DisplacedMotion, OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
     The prior of 0.02 rad is about one degree; that of a slide is 0.02 m.
@@ -111,7 +111,7 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         reason = f"A joint whose zero is wrong by more than {LARGEST_OFFSET:g} rad, six degrees, is seen with the eye."
         return (PhysicalBound("rad", LARGEST_OFFSET, reason),)
 
-    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the first and second differences in the position of the joint."""
         unit = np.eye(len(robot.joints))[self.index_in(robot)]
         state = motion.evaluate(time)
@@ -121,7 +121,7 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         ]
         first = np.array([-0.5, 0.0, 0.5]) / OFFSET_STEP
         second = np.array([0.5, -1.0, 0.5]) / OFFSET_STEP**2
-        return Displaced(motions, np.stack([first, second]))
+        return _Displaced(motions, np.stack([first, second]))
 
     def loads(self, values: Array) -> Array:
         """Return the powers of the offset, with the sign of true less recorded position."""
@@ -133,7 +133,7 @@ LATENCY_STEP = 0.15
 
 
 @register
-class JointLatency(DisplacedMotion):
+class JointLatency(_DisplacedMotion):
     """Delay of the recorded joint motion: the position stamped t is that of t - delay.
 
     The prior of 0.2 s is a few cycles of a slow data bus.
@@ -158,11 +158,11 @@ class JointLatency(DisplacedMotion):
         """Return a cycle of slow telemetry."""
         return (PhysicalBound("s", LARGEST_DELAY, "A slow telemetry stamps its samples once in a second."),)
 
-    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the coefficients of the quartic through five samples in time."""
         shifts = LATENCY_STEP * np.arange(-2, 3)
         motions = [kinematics(robot, motion.evaluate(time + shift)) for shift in shifts]
-        return Displaced(motions, np.linalg.inv(np.vander(shifts, increasing=True))[1:])
+        return _Displaced(motions, np.linalg.inv(np.vander(shifts, increasing=True))[1:])
 
     def loads(self, values: Array) -> Array:
         """Return the powers of the delay, by which the arm is ahead of its record."""
@@ -170,7 +170,7 @@ class JointLatency(DisplacedMotion):
 
 
 @register
-class JointFlexibility(DisplacedMotion, OnJoint):
+class JointFlexibility(_DisplacedMotion, OnJoint):
     """Compliance of a joint, whose link side follows the measured motor side on a damped spring.
 
     ``frequency`` is that of all bodies beyond the joint on the spring, with the base held and all joints at zero, so
@@ -221,7 +221,7 @@ class JointFlexibility(DisplacedMotion, OnJoint):
             PhysicalBound("s3", 2.0 * STRONGEST_DAMPING * omega**-3, f"{soft}, with {STRONGEST_DAMPING:g} of damping."),
         )
 
-    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the displacements by the deflection under the joint's torque, and by its derivatives."""
         index, state = self.index_in(robot), motion.evaluate(time)
         deflection = _Deflection(robot, motion, index, float(time[-1]))
@@ -232,7 +232,7 @@ class JointFlexibility(DisplacedMotion, OnJoint):
                 for derivative in range(3):
                     changed[derivative][:, index] += sign * deflection.derivative(time, order + derivative)
                 motions.append(kinematics(robot, JointState(*changed)))
-        return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
+        return _Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
 
     # on a floating base, changes in proportion to the parameters of unknown bodies would be far too large
     body_tables, body_loads = Effect.body_tables, Effect.body_loads
@@ -310,7 +310,7 @@ def _loaded(robot: Robot) -> pin.Model:
     return model
 
 
-class Displaced(NamedTuple):
+class _Displaced(NamedTuple):
     """Change of the motion of all links, as a weighted sum over motions with m coefficients.
 
     The change of any body's kinematic table is ``sum_k c_k sum_s weights[k, s] table(motions[s])``, where the c_k are

@@ -289,23 +289,71 @@ class Effect:
         return changed
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
-        """Return the angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
+        """Return the angular momentum relative to the base and its derivative, as a free couple [N m s, N m].
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        instant : Instant
+            Motion and environment at one instant.
+        inner : (states,) array
+            Inner states of the effect.
+        """
         return jnp.zeros(3), jnp.zeros(3)
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
-        """Return the external force and its torque about the base origin [N, N m]."""
+        """Return the external force and its torque about the base origin [N, N m].
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        instant : Instant
+            Motion and environment at one instant.
+        inner : (states,) array
+            Inner states of the effect.
+        """
         return Wrench(jnp.zeros(3), jnp.zeros(3))
 
     def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
-        """Return the derivative of the inner states, shape (states,)."""
+        """Return the derivative of the inner states, shape (states,).
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        instant : Instant
+            Motion and environment at one instant.
+        inner : (states,) array
+            Inner states of the effect.
+        """
         return jnp.zeros(self.states)
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
-        """Return the specific force at ``lever`` from the centre of mass beyond that of wrench and motion [m/s2]."""
+        """Return the specific force at ``lever`` from the centre of mass beyond that of wrench and motion [m/s2].
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        instant : Instant
+            Motion and environment at one instant.
+        lever : (3,) array
+            Position of the point from the centre of mass [m].
+        """
         return jnp.zeros(3)
 
     def gravity_gradient_tensor(self, values: Array, instant: Instant) -> Array:
-        """Return the gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
+        """Return the gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2].
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        instant : Instant
+            Motion and environment at one instant.
+        """
         return jnp.zeros((3, 3))
 
     def modes(self, values: Array) -> Modes:
@@ -313,7 +361,16 @@ class Effect:
         raise NotImplementedError
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
-        """Return the changes of the tables (`bayesid.robot.composite_tables`) per coefficient, shape (T, 28, m)."""
+        """Return the changes of the tables (`bayesid.robot.composite_tables`) per coefficient, shape (T, 28, m).
+
+        Parameters
+        ----------
+        robot : Robot
+        motion : Motion
+            Motion of the joints.
+        time : (T,) array
+            Instants [s].
+        """
         return np.zeros((len(time), 28, 0))
 
     def loads(self, values: Array) -> Array:
@@ -323,19 +380,54 @@ class Effect:
     def body_tables(
         self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
     ) -> list[tuple[str | None, Floats]]:
-        """Return `table` in parts (T, 28, n), each with the link to which it belongs, for given unknown links."""
+        """Return `table` in parts (T, 28, n), each with the link to which it belongs, for given unknown links.
+
+        Parameters
+        ----------
+        robot : Robot
+        unknown : sequence of str
+            Links whose parameters are unknown.
+        motion : Motion
+            Motion of the joints.
+        time : (T,) array
+            Instants [s].
+        """
         return [(self.link, self.table(robot, motion, time))]
 
     def body_loads(self, values: Array, inertial: Array) -> Array:
-        """Return the coefficients of the columns of `body_tables`, given ten parameters of each unknown link."""
+        """Return the coefficients of the columns of `body_tables`, given ten parameters of each unknown link.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        inertial : (10 B,) array
+            Ten linear parameters of each of B unknown links.
+        """
         return self.loads(values)
 
     def read(self, values: Array, readings: Readings) -> Readings:
-        """Return the readings of faulty sensors from the true readings, in sensor axes."""
+        """Return the readings of faulty sensors from the true readings, in sensor axes.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        readings : Readings
+            True readings of one recording.
+        """
         return readings
 
     def friction(self, values: Array, velocity: Array) -> Array:
-        """Return the motor torques (T, n) in addition to those that move the bodies, at joint speeds (T, n)."""
+        """Return the motor torques (T, n) in addition to those that move the bodies, at joint speeds (T, n).
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        velocity : (T, n) array
+            Speeds of all joints [rad/s or m/s].
+        """
         return jnp.zeros_like(velocity)
 
     def uses(self, hook: str) -> bool:

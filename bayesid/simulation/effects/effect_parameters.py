@@ -36,7 +36,15 @@ class Prior(Enum):
     UNIFORM = "uniform"
 
     def physical(self, mean: Traceable, sigma: Traceable, z: Traceable) -> Traceable:
-        """Return the physical values of coordinates with a standard-normal prior, arrays of NumPy or JAX."""
+        """Return the physical values of coordinates with a standard-normal prior, arrays of NumPy or JAX.
+
+        Parameters
+        ----------
+        mean, sigma : array
+            Parameters of the prior, in the unit of the value.
+        z : array
+            Coordinates with a standard-normal prior.
+        """
         if self is Prior.LOG_NORMAL:
             return mean * namespace(z).exp(sigma * z)
         if self is Prior.UNIFORM:
@@ -86,7 +94,15 @@ WELL_INSIDE = 0.8
 
 
 def coordinates_of(parameters: Sequence[Parameter], values: Sequence[float]) -> Floats:
-    """Return the coordinates of physical values, of which those outside a bounded range are moved into it."""
+    """Return the coordinates of physical values, of which those outside a bounded range are moved into it.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Parameters with their priors.
+    values : sequence of float
+        Value of each, in its unit.
+    """
     coordinates = []
     for parameter, value in zip(parameters, values, strict=True):
         if parameter.prior is Prior.LOG_NORMAL:

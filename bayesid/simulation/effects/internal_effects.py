@@ -211,14 +211,14 @@ class FuelSlosh(_Vibration):
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the position of the tank bounded by the spacecraft."""
-        centre, reach = spacecraft_box(robot)
+        centre, reach = _spacecraft_box(robot)
         changed = type(self).__new__(type(self))
         changed.__dict__.update(self.__dict__)
         changed.parameters = (
             *self.parameters[:3],
             *(
-                own._replace(sigma=float(size) if own.sigma == REACH else own.sigma, mean=float(middle))
-                for own, size, middle in zip(self.parameters[3:], reach, centre, strict=True)
+                place._replace(sigma=float(size) if place.sigma == REACH else place.sigma, mean=float(middle))
+                for place, size, middle in zip(self.parameters[3:], reach, centre, strict=True)
             ),
         )
         return changed
@@ -242,7 +242,7 @@ class FuelSlosh(_Vibration):
         starts = [(max(mass, SMALLEST_MASS), place)]
         if alone:  # the position may have several optima
             starts += [(SLOSH_MASS, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
-        return [coordinates_of(self.parameters, [own, first.frequency, first.damping, *where]) for own, where in starts]
+        return [coordinates_of(self.parameters, [m, first.frequency, first.damping, *where]) for m, where in starts]
 
     def modes(self, values: Array) -> Modes:
         """Return three modes, one along each axis."""
@@ -257,7 +257,7 @@ class FuelSlosh(_Vibration):
         )
 
 
-def spacecraft_box(robot: Robot) -> tuple[Floats, Floats]:
+def _spacecraft_box(robot: Robot) -> tuple[Floats, Floats]:
     """Return the centre and half sizes of one and a half times the uniform box of the base's inertia, base axes [m]."""
     base = robot.link(robot.base).inertial
     second = np.diag(base.pseudo_inertia[:3, :3]) / base.mass - base.com**2

@@ -51,7 +51,7 @@ class _OnTorque(OnJoint):
         changed.index = self.index_in(robot)
         if robot.joints[changed.index].kind == "prismatic":
             changed.parameters = tuple(
-                item._replace(unit=OF_SLIDES.get(item.unit, item.unit)) for item in self.parameters
+                parameter._replace(unit=OF_SLIDES.get(parameter.unit, parameter.unit)) for parameter in self.parameters
             )
         return changed
 
@@ -59,7 +59,7 @@ class _OnTorque(OnJoint):
 
     def friction(self, values: Array, velocity: Array) -> Array:
         """Return the torque of the effect in the column of its joint, and zero in all others."""
-        return jnp.zeros_like(velocity).at[:, self.index].set(self.extra(values, velocity[:, self.index]))
+        return jnp.zeros_like(velocity).at[:, self.index].set(self._extra(values, velocity[:, self.index]))
 
     def drive(self, robot: Robot) -> tuple[float, str]:
         """Return the largest torque [N m], or force [N], of the joint's drive, and words that say where it is from."""
@@ -74,7 +74,7 @@ class _OnTorque(OnJoint):
         torque, load = three_digits(DRIVE * inertia), three_digits(inertia)
         return DRIVE * inertia, f"the {torque} N m that accelerate the {load} kg m2 beyond it by {DRIVE:g} rad/s2"
 
-    def extra(self, values: Array, velocity: Array) -> Array:
+    def _extra(self, values: Array, velocity: Array) -> Array:
         """Return the additional reading of the sensor at joint speeds (T,), shape (T,)."""
         raise NotImplementedError
 
@@ -107,7 +107,7 @@ class JointFriction(_OnTorque):
             PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, and does so at a speed of {SPEED:g}."),
         )
 
-    def extra(self, values: Array, velocity: Array) -> Array:
+    def _extra(self, values: Array, velocity: Array) -> Array:
         """Return the motor torque that overcomes friction."""
         return values[0] * jnp.tanh(velocity / REVERSAL) + values[1] * velocity
 
@@ -132,6 +132,6 @@ class TorqueBias(_OnTorque):
         reason = f"The zero of a torque sensor is wrong by at most {100.0 * SENSOR_ERROR:g} % of {drive}."
         return (PhysicalBound(self.parameters[0].unit, SENSOR_ERROR * torque, reason),)
 
-    def extra(self, values: Array, velocity: Array) -> Array:
+    def _extra(self, values: Array, velocity: Array) -> Array:
         """Return the constant error."""
         return jnp.broadcast_to(values[0], velocity.shape)

@@ -138,6 +138,13 @@ class MassShift(Effect):
 
         They are those of `table` and depend neither on the robot nor on its motion, since the base does not move in its
         own axes. Multiplied by the moments, in the order of ``parameters``, they give the change of the tables.
+
+        Parameters
+        ----------
+        time : (T,) array
+            Times of the columns [s].
+        instant : float
+            Instant of the shift [s].
         """
         unit = np.zeros((WIDTH, len(FIRST) + len(SECOND)))
         unit[ENTRIES["first"], : len(FIRST)] = np.eye(len(FIRST))

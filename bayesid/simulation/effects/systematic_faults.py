@@ -62,7 +62,17 @@ class SystematicFault(Effect):
         return super().lacks(model) or (None if model.sensor(cls.sensor) else f"[{cls.sensor.section}]")
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
-        """Return the reading of the faulty sensor from the true reading, both of shape (T, axes)."""
+        """Return the reading of the faulty sensor from the true reading, both of shape (T, axes).
+
+        Parameters
+        ----------
+        values : (p,) array
+            Values of the parameters.
+        time : (T,) array
+            Times of the samples [s].
+        reading : (T, axes) array
+            True readings, sensor axes.
+        """
         raise NotImplementedError
 
     def read(self, values: Array, readings: Readings) -> Readings:
@@ -71,7 +81,7 @@ class SystematicFault(Effect):
         return readings.replace(**{key: self.change(values, readings.time, readings.channels[key])})
 
 
-class FaultOfAnyKind(SystematicFault):
+class _FaultOfAnyKind(SystematicFault):
     """Fault that sensors of all kinds can have; `of` gives the effect for one kind.
 
     In the name SENSOR stands for the kind, and the summary has places for the words of its `Instrument`. A sensor whose
@@ -109,14 +119,14 @@ class FaultOfAnyKind(SystematicFault):
         return kind.is_difference
 
 
-def _restored(fault: type[FaultOfAnyKind], kind: SensorKind, attributes: dict[str, Any]) -> FaultOfAnyKind:
+def _restored(fault: type[_FaultOfAnyKind], kind: SensorKind, attributes: dict[str, Any]) -> _FaultOfAnyKind:
     """Return an effect of a class that is made and therefore not found by its name, for `pickle`."""
     effect = fault.of(kind)()
     vars(effect).update(attributes)
     return effect
 
 
-class FaultByAxis(FaultOfAnyKind):
+class _FaultByAxis(_FaultOfAnyKind):
     """Fault with one parameter for each axis of the sensor.
 
     Parameters
@@ -144,7 +154,7 @@ class FaultByAxis(FaultOfAnyKind):
 
 
 @register
-class SensorBias(FaultByAxis):
+class SensorBias(_FaultByAxis):
     """Constant error of a sensor; the default prior is that of `Instrument`."""
 
     name = "SENSOR-bias"
@@ -177,7 +187,7 @@ class SensorBias(FaultByAxis):
 
 
 @register
-class SensorDrift(FaultByAxis):
+class SensorDrift(_FaultByAxis):
     """Error of a sensor that grows with time; with the default prior it gains about the prior bias in a minute."""
 
     name = "SENSOR-drift"
@@ -213,7 +223,7 @@ class SensorDrift(FaultByAxis):
 
 
 @register
-class SensorScale(FaultByAxis):
+class SensorScale(_FaultByAxis):
     """Error of a sensor's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
 
     name = "SENSOR-scale"
@@ -233,7 +243,7 @@ class SensorScale(FaultByAxis):
 
 
 @register
-class SensorMisalignment(FaultByAxis):
+class SensorMisalignment(_FaultByAxis):
     """Rotation of a sensor of a vector against its stated mounting; the prior is two degrees per axis."""
 
     name = "SENSOR-misalignment"
@@ -324,7 +334,7 @@ class AttitudeMisalignment(SystematicFault):
 
 
 @register
-class SensorLatency(FaultOfAnyKind):
+class SensorLatency(_FaultOfAnyKind):
     """Delay of a sensor; the prior is a few cycles of a slow data bus."""
 
     name = "SENSOR-latency"
@@ -347,7 +357,7 @@ class SensorLatency(FaultOfAnyKind):
 
 
 @register
-class SensorClock(FaultOfAnyKind):
+class SensorClock(_FaultOfAnyKind):
     """Error of a sensor's clock: stamped = true time (1 + rate); the prior is ten times a crystal's error.
 
     Where the clock is slow, the last samples lie after the end of the recording by ``-rate`` times its length.
