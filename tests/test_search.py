@@ -194,4 +194,4 @@ def test_a_plan_is_made_smaller_until_it_may_be_flown(planar: Problem) -> None:
     last = attempts[-1]
     assert last.go
     assert not last.broken
-    assert np.abs(last.found.parameters - own.plan.family.centre).max() > 0.0
+    assert np.abs(last.optimum.parameters - own.plan.family.centre).max() > 0.0

@@ -87,7 +87,7 @@ def test_the_whole_study_small(tmp_path):
         realised = {"d-optimal": replace(own, errors=errors)}
         (goal,) = (goal for goal in goals(replace(result, realised=realised)) if goal.text.startswith("Realised"))
         assert goal.verdict is verdict  # six flights do not decide that errors are as predicted
-    cost = result.contest.designs["d-optimal"].found.cost
+    cost = result.contest.designs["d-optimal"].optimum.cost
     crowds = {name: replace(crowd, costs=np.full(100, cost), cost=cost) for name, crowd in result.crowds.items()}
     for away, verdict in ((0.0, Verdict.PASS), (0.3, Verdict.PASS), (0.5, Verdict.FAIL)):
         searches = Searches(np.zeros(1), np.array([cost, cost + away]))

@@ -32,7 +32,7 @@ from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
-from bayesid.design.trajectory_search import THOROUGH, Found, Search, Store, optimise
+from bayesid.design.trajectory_search import THOROUGH, Search, SearchResult, Store, optimise
 from bayesid.robot.kinematics import Tip
 
 __all__ = [
@@ -45,7 +45,6 @@ __all__ = [
     "DOptimal",
     "Design",
     "EOptimal",
-    "Found",
     "Fourier",
     "Goal",
     "InformationGain",
@@ -66,6 +65,7 @@ __all__ = [
     "RelativePrecision",
     "Sampled",
     "Search",
+    "SearchResult",
     "Separation",
     "SimulatedSpacecraft",
     "Spacecraft",

@@ -28,7 +28,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 
-__all__ = ["BasePredictor", "Prediction", "last_link", "predict"]
+__all__ = ["BasePredictor", "Prediction", "predict"]
 
 # sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]
 ATTITUDE = Sensor(SensorKind.ATTITUDE, White(1e-6))
@@ -91,7 +91,7 @@ class BasePredictor:
     def __init__(
         self, model: Model, manoeuvre: Manoeuvre, tip_frame: str | None = None, like: BasePredictor | None = None
     ) -> None:
-        self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or last_link(model.robot)
+        self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or _last_link(model.robot)
         planned = replace(manoeuvre, recording=_planned(manoeuvre.recording), motion=_Exact(manoeuvre.motion))
         if like is None:
             self.posterior = Posterior.of(_moved_alone(model), [planned])
@@ -102,14 +102,30 @@ class BasePredictor:
         self._tip = Tip.of(model.robot, self.tip_frame).motion(model.robot, manoeuvre.motion.evaluate(self.time))[0]
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return draws of the prior in which the initial rate is the known one, shape (count, size)."""
+        """Return draws of the prior in which the initial rate is the known one, shape (count, size).
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        rng : numpy.random.Generator
+            Source of the draws.
+        """
         z = rng.normal(size=(count, self.posterior.size))
         rates = self.posterior.unknowns.layout.all_rates
         z[:, rates] = self.centre[rates]
         return z
 
     def predict(self, draws: int, rng: np.random.Generator) -> Prediction:
-        """Return the prediction from a number of draws of the prior."""
+        """Return the prediction from a number of draws of the prior.
+
+        Parameters
+        ----------
+        draws : int
+            Number of draws, at least 16.
+        rng : numpy.random.Generator
+            Source of the draws.
+        """
         if draws < FEWEST:
             raise InputError(f"{draws} draws give no region", remedy=f"Ask for {FEWEST} or more; hundreds are usual")
         return Prediction(self.name, self.tip_frame, self.rate, *self.courses(self.draw(draws, rng)))
@@ -154,7 +170,7 @@ def predict(
     return BasePredictor(model, manoeuvre, tip_frame).predict(draws, rng)
 
 
-def last_link(robot: Robot) -> str:
+def _last_link(robot: Robot) -> str:
     """Return the name of the last link of the robot, without loads."""
     return [name for name in robot.links if name not in robot.loads][-1]
 

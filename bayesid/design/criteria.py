@@ -107,7 +107,13 @@ class Criterion:
         return False
 
     def shown(self, plan: Plan, outcome: Outcome) -> list[Array]:
-        """Return what a manoeuvre shows, arrays whose sums over some manoeuvres `adapted` takes."""
+        """Return what a manoeuvre shows, arrays whose sums over some manoeuvres `adapted` takes.
+
+        Parameters
+        ----------
+        plan, outcome
+            As of `cost`.
+        """
         raise NotImplementedError
 
     def adapted(self, shown: Sequence[Floats]) -> Criterion:
@@ -423,7 +429,13 @@ class Separation(Criterion):
         return forms
 
     def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,)."""
+        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,).
+
+        Parameters
+        ----------
+        plan, outcome
+            As of `cost`.
+        """
         forms = self.shown(plan, outcome)
         if self.visible is not None:
             bases = [jnp.asarray(directions) for directions in self.visible]

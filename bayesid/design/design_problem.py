@@ -121,9 +121,9 @@ class Problem:
     @cached_property
     def explained(self) -> Floats:
         """Directions of the readings that errors of the encoders could explain (`encoder_directions`), at rest."""
-        return self.explained_along(self.plan.family.centre)
+        return self._explained_along(self.plan.family.centre)
 
-    def explained_along(self, parameters: Floats) -> Floats:
+    def _explained_along(self, parameters: Floats) -> Floats:
         """Return the directions of the readings that errors of the encoders could explain along a motion."""
         samples = self.plan.samples
         if not any(self.plan.encoder_sigma):
@@ -222,7 +222,15 @@ class Problem:
                 cost(parameters, self.centre, 0, self.precision, self.explained)
 
     def draws(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n)."""
+        """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n).
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        rng : numpy.random.Generator
+            Source of the draws.
+        """
         bodies = 10 * len(self.plan.model.priors)
         points = np.tile(self.centre, (count, 1))
         covariance = np.linalg.inv(self.precision)[:bodies, :bodies]
@@ -230,7 +238,17 @@ class Problem:
         return points
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
-        """Return a criterion and its gradient, averaged over points of the unknowns, by default the prior's centre."""
+        """Return a criterion and its gradient, averaged over points of the unknowns, by default the prior's centre.
+
+        Parameters
+        ----------
+        criterion : Criterion
+            One of the problem's criteria.
+        parameters : (n,) array
+            Motion in its family.
+        points : sequence of (N,) arrays
+            Points of the unknowns, by default the prior's centre.
+        """
         alike = [one for one in self.criteria if one.informed is criterion.informed]
         compiled = self._informed_cost if criterion.informed else self._motion_cost
         index = alike.index(criterion)
@@ -238,7 +256,15 @@ class Problem:
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
 
     def costs(self, parameters: Floats, points: Mapping[str, list[Floats]] = MappingProxyType({})) -> dict[str, float]:
-        """Return the values of all criteria by name, each averaged over its points or at the prior's centre."""
+        """Return the values of all criteria by name, each averaged over its points or at the prior's centre.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Motion in its family.
+        points : mapping of str to list of (N,) arrays
+            Points of the unknowns by the name of a criterion.
+        """
         return {
             criterion.name: self.cost(criterion, parameters, points.get(criterion.name, ()))[0]
             for criterion in self.criteria
@@ -270,7 +296,17 @@ class Problem:
         ]
 
     def largest(self, parameters: Floats, points: Floats, limits: Sequence[Limit]) -> Floats:
-        """Return the largest values (k, limits) of some limited quantities at points (k, n) of the unknowns."""
+        """Return the largest values (k, limits) of some limited quantities at points (k, n) of the unknowns.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Motion in its family.
+        points : (k, N) array
+            Points of the unknowns.
+        limits : sequence of Limit
+            Limits of the quantities.
+        """
         rows = []
         for z in points:
             trajectory = self.trajectory(parameters, z)
@@ -278,11 +314,27 @@ class Problem:
         return np.array(rows).reshape(len(points), len(limits))
 
     def trajectory(self, parameters: Floats, z: Floats | None = None) -> Trajectory:
-        """Return the motion of the robot on the fine grid, by default at the prior's centre."""
+        """Return the motion of the robot on the fine grid, by default at the prior's centre.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Motion in its family.
+        z : (N,) array, optional
+            Point of the unknowns, by default the prior's centre.
+        """
         return jax.tree.map(np.asarray, self._fine_trajectory(parameters, self.centre if z is None else z))
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
-        """Return draws of the prior over which a criterion is averaged, an empty list if it uses the centre alone."""
+        """Return draws of the prior over which a criterion is averaged, an empty list if it uses the centre alone.
+
+        Parameters
+        ----------
+        criterion : Criterion
+            Criterion that states its number of draws.
+        rng : numpy.random.Generator
+            Source of the draws.
+        """
         return list(self.draws(criterion.draws, rng))
 
     # ---- compiled ----

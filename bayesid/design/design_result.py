@@ -21,11 +21,11 @@ from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoe
 from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.design.trajectory import Trajectory
-from bayesid.design.trajectory_search import Found, Search, Store, optimise
+from bayesid.design.trajectory_search import Search, SearchResult, Store, optimise
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
-__all__ = ["Design", "Risk", "Shares", "best_design", "design", "each", "evaluate", "sample_times"]
+__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
 
 CERTAIN = 0.99  # probability with which a limit must hold for a manoeuvre to be flown
 PASSES = 4  # largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them
@@ -58,7 +58,7 @@ class Design:
     criterion: str  #: name of the criterion by which it was designed
     problem: Problem  #: design problem
     parameters: Floats  #: (n,) parameters of the motion in its family
-    found: Found  #: outcome of the search
+    optimum: SearchResult  #: outcome of the search
     costs: Mapping[str, float]  #: values of all criteria of the problem, by name
     posterior: Posterior  #: posterior of the manoeuvre as it would be recorded without noise
     predicted: Predicted  #: predicted posterior of the bodies to identify
@@ -117,7 +117,7 @@ class Design:
                 for risk in self.risks
             },
             "criteria": dict(self.costs),
-            "search": {"costs_of_starts": list(self.found.costs), "evaluations": self.found.evaluations},
+            "search": {"costs_of_starts": list(self.optimum.costs), "evaluations": self.optimum.evaluations},
             "file": f"{self.name}.csv",
         }
 
@@ -132,14 +132,22 @@ def best_design(designs: Sequence[Design]) -> Design:
     """
     kept = [design for design in designs if all(reached.kept for reached in design.reached)]
     if not kept:
-        broken = {item.name for design in designs for item in design.reached if not item.kept}
+        broken = {reached.name for design in designs for reached in design.reached if not reached.kept}
         problem = f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}"
         raise InputError(problem, place="design.limits", remedy="Loosen these limits, or allow more time")
     return min(kept, key=lambda design: design.predicted.log_det)
 
 
 def sample_times(duration: float, interval: float) -> Floats:
-    """Return the times of all samples of a manoeuvre [s]; the last is its end if the interval divides the duration."""
+    """Return the times of all samples of a manoeuvre [s]; the last is its end if the interval divides the duration.
+
+    Parameters
+    ----------
+    duration : float
+        Duration of the manoeuvre [s].
+    interval : float
+        Time between samples [s].
+    """
     return interval * np.arange(int(np.floor(duration / interval + 1e-6)) + 1)
 
 
@@ -190,9 +198,9 @@ def design(
         criterion.name: problem.points(criterion, np.random.default_rng(stream))
         for criterion, stream in zip(problem.criteria, seeds[count:], strict=True)
     }
-    shares = Shares(part_of(progress, 0.0, SEARCHING), count)
+    shares = _Shares(part_of(progress, 0.0, SEARCHING), count)
 
-    def search_by(index: int) -> Found:
+    def search_by(index: int) -> SearchResult:
         criterion = problem.criteria[index]
         kept = store.of(f"{problem.plan.family.name}.{criterion.name}")
         return optimise(
@@ -208,22 +216,22 @@ def design(
         )
 
     problem.compile()
-    found = each(search_by, count, search.executor)
-    found = _consistent(problem, points, found, search, store, part_of(progress, SEARCHING, EVALUATING))
+    optima = _each(search_by, count, search.executor)
+    optima = _consistent(problem, points, optima, search, store, part_of(progress, SEARCHING, EVALUATING))
     streams = last.spawn(count)
 
     def evaluate_by(index: int) -> Design:
         name, rng = problem.criteria[index].name, np.random.default_rng(streams[index])
-        return evaluate(problem, name, found[index], encoder, rng, points=points)
+        return evaluate(problem, name, optima[index], encoder, rng, points=points)
 
     progress(EVALUATING, "predicting what each manoeuvre leads to")
-    return each(evaluate_by, count, search.executor)
+    return _each(evaluate_by, count, search.executor)
 
 
 def evaluate(
     problem: Problem,
     name: str,
-    found: Found,
+    optimum: SearchResult,
     encoder: Encoder,
     rng: np.random.Generator,
     *,
@@ -237,7 +245,7 @@ def evaluate(
         Design problem.
     name : str
         Name of the manoeuvre and of its criterion.
-    found : Found
+    optimum : SearchResult
         Outcome of the search, with the parameters of the motion.
     encoder : Encoder
         Noise of the encoders.
@@ -247,7 +255,7 @@ def evaluate(
         Points of the unknowns over which each criterion is averaged, by its name; by default the prior's centre.
     """
     plan = problem.plan
-    parameters = found.parameters
+    parameters = optimum.parameters
     manoeuvre = planned_manoeuvre(
         plan.model,
         plan.family.motion(parameters),
@@ -264,7 +272,7 @@ def evaluate(
         criterion=name,
         problem=problem,
         parameters=parameters,
-        found=found,
+        optimum=optimum,
         costs=problem.costs(parameters, points),
         posterior=posterior,
         predicted=predict(posterior),
@@ -298,24 +306,24 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
 def _consistent(
     problem: Problem,
     points: Mapping[str, list[Floats]],
-    found: Sequence[Found],
+    optima: Sequence[SearchResult],
     search: Search,
     store: Store,
     progress: Progress,
-) -> list[Found]:
+) -> list[SearchResult]:
     """Return for each criterion a manoeuvre that no other is better than, by descents from those that are better."""
-    result, alone = list(found), replace(search, starts=0, exchanges=0)
+    result, alone = list(optima), replace(search, starts=0, exchanges=0)
     for number in range(PASSES):
         changed = False
         for index, criterion in enumerate(problem.criteria):
-            own = points[criterion.name]
-            costs = [problem.cost(criterion, item.parameters, own)[0] for item in result]
+            draws = points[criterion.name]
+            costs = [problem.cost(criterion, optimum.parameters, draws)[0] for optimum in result]
             best = int(np.argmin(costs))
             if costs[best] >= costs[index]:
                 continue
             changed = True
             kept = store.of(f"{problem.plan.family.name}.{criterion.name}.again-{number}")
-            again = Found(result[best].parameters, costs[best], (), 0)
+            again = SearchResult(result[best].parameters, costs[best], (), 0)
             if number < PASSES - 1:
                 again = optimise(
                     problem,
@@ -323,12 +331,12 @@ def _consistent(
                     np.random.default_rng(0),  # no number is drawn
                     alone,
                     first=[result[best].parameters],
-                    points=own,
+                    points=draws,
                     known=kept.known,
                     keep=kept.keep,
                 )
             evaluations = again.evaluations + result[index].evaluations
-            result[index] = Found(again.parameters, again.cost, (again.cost, *result[index].costs), evaluations)
+            result[index] = SearchResult(again.parameters, again.cost, (again.cost, *result[index].costs), evaluations)
             progress((number + index / len(result)) / PASSES, f"{criterion.name}: best {again.cost:.4g}")
         if not changed:
             break
@@ -338,7 +346,7 @@ def _consistent(
 T = TypeVar("T")  # type of the result of one search
 
 
-def each(function: Callable[[int], T], count: int, executor: Executor | None) -> list[T]:
+def _each(function: Callable[[int], T], count: int, executor: Executor | None) -> list[T]:
     """Return a function's values at 0 to ``count`` - 1, computed in threads if there is an executor.
 
     If one fails or the user interrupts, the executor is shut down, so that the others end as well.
@@ -353,7 +361,7 @@ def each(function: Callable[[int], T], count: int, executor: Executor | None) ->
             raise
 
 
-class Shares:
+class _Shares:
     """Progress of several computations at once, which is their mean.
 
     Parameters

@@ -28,7 +28,15 @@ UNIT = 16  # unit of the padded number of directions, so that motions share comp
 
 
 def position_noise(encoder: Encoder, joints: tuple[str, ...]) -> Floats:
-    """Return the standard deviation of each joint's position samples [rad or m], zero where none is known."""
+    """Return the standard deviation of each joint's position samples [rad or m], zero where none is known.
+
+    Parameters
+    ----------
+    encoder : Encoder
+        Noise of the encoders.
+    joints : tuple of str
+        Names of the joints.
+    """
     level = encoder.get(0)
     by_joint = level if isinstance(level, Mapping) else dict.fromkeys(joints, level)
     return np.array([by_joint.get(joint) or 0.0 for joint in joints])

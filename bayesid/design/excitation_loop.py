@@ -159,17 +159,18 @@ class Loop:
             problem, criterion, np.random.SeedSequence([self.seed, number, 0]), self.search, store, progress
         )
         best = attempts[-1]
-        motion = plan.family.motion(best.found.parameters)
+        motion = plan.family.motion(best.optimum.parameters)
         time = sample_times(plan.family.duration, plan.interval)
         plan_recording(motion, plan.model.robot, time, stem).write(history.path(number, "plan"))
         content = {
             "go": best.go,
             "criterion": criterion.name,
-            "cost": best.found.cost,
+            "cost": best.optimum.cost,
             "parameterisation": plan.family.name,
-            "parameters": dict(zip(plan.family.names, map(float, best.found.parameters), strict=True)),
+            "parameters": dict(zip(plan.family.names, map(float, best.optimum.parameters), strict=True)),
             "limits": {
-                item.name: {"limit": item.limit, "largest": item.largest, "unit": item.unit} for item in best.reached
+                reached.name: {"limit": reached.limit, "largest": reached.largest, "unit": reached.unit}
+                for reached in best.reached
             },
             "attempts": [attempt.to_dict() for attempt in attempts],
         }
@@ -235,9 +236,9 @@ class Loop:
             {} if review is None else review["probabilities"],
             int(np.random.SeedSequence([self.seed, number, 3]).generate_state(1)[0]),
         )
-        found = [(goal, goal.value(knowledge)) for goal in self.goals]
-        history.note(number, "goals", [goal_dict(goal, value) for goal, value in found])
-        return all(goal.reached(value) for goal, value in found)
+        assessed = [(goal, goal.value(knowledge)) for goal in self.goals]
+        history.note(number, "goals", [goal_dict(goal, value) for goal, value in assessed])
+        return all(goal.reached(value) for goal, value in assessed)
 
     def _flown(self, history: History, number: int) -> Manoeuvre:
         """Return the manoeuvre of a step as it was recorded."""

@@ -14,7 +14,7 @@ from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.design_result import Risk, risks
 from bayesid.design.motion_limits import Limits
-from bayesid.design.trajectory_search import Found, Search, Store, optimise
+from bayesid.design.trajectory_search import Search, SearchResult, Store, optimise
 
 __all__ = ["Attempt", "plan_to_go"]
 
@@ -30,7 +30,7 @@ class Attempt:
     """One design on the way to a plan that may be flown."""
 
     limits: Limits  #: limits under which the manoeuvre was designed
-    found: Found  #: outcome of the search
+    optimum: SearchResult  #: outcome of the search
     risks: Sequence[Risk]  #: risks against the limits of the problem
     reached: Sequence[Reached]  #: largest values at the prior's centre, against the limits of the problem
 
@@ -43,7 +43,7 @@ class Attempt:
     def broken(self) -> list[str]:
         """Names of the limits that do not hold."""
         risky = [risk.name for risk in self.risks if not risk.go]
-        return list(dict.fromkeys([*risky, *(item.name for item in self.reached if not item.kept)]))
+        return list(dict.fromkeys([*risky, *(largest.name for largest in self.reached if not largest.kept)]))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of loop.json: for each uncertain limit its value, the tightened value and the quantile."""
@@ -131,12 +131,12 @@ def _made_smaller(problem: Problem, criterion: Criterion, last: Attempt, draws: 
     centre = problem.plan.family.centre
     for _ in range(SHRUNK):
         factors = [risk.limit / risk.quantile for risk in last.risks if not risk.go]
-        factors += [item.limit / item.largest for item in last.reached if not item.kept]
+        factors += [reached.limit / reached.largest for reached in last.reached if not reached.kept]
         size = float(np.clip(MARGIN * np.nan_to_num(min(factors)), LEAST, MARGIN))
-        parameters = centre + size * (last.found.parameters - centre)
-        found = replace(last.found, parameters=parameters, cost=problem.cost(criterion, parameters)[0])
+        parameters = centre + size * (last.optimum.parameters - centre)
+        optimum = replace(last.optimum, parameters=parameters, cost=problem.cost(criterion, parameters)[0])
         risky = risks(problem, parameters, np.random.default_rng(draws))
-        last = Attempt(last.limits, found, risky, problem.reached(parameters))
+        last = Attempt(last.limits, optimum, risky, problem.reached(parameters))
         if last.go:
             break
     return last

@@ -39,7 +39,17 @@ class Identifier(Protocol):
     """Method of the identification inside the loop."""
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
-        """Write draws to a file that `InertialDraws.read` reads, and return the entry of the fit for loop.json."""
+        """Write draws to a file that `InertialDraws.read` reads, and return the entry of the fit for loop.json.
+
+        Parameters
+        ----------
+        posterior : Posterior
+            Posterior of all recordings so far.
+        seed : int
+            Seed of all random numbers.
+        file : Path
+            File of the draws.
+        """
         ...
 
 
@@ -102,7 +112,15 @@ class Laplace:
 
 
 def updated_model(model: Model, draws: InertialDraws) -> Model:
-    """Return the model with draws of all its uncertain bodies as their joint prior."""
+    """Return the model with draws of all its uncertain bodies as their joint prior.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the step.
+    draws : InertialDraws
+        Draws of all its uncertain bodies.
+    """
     names = [prior.name for prior in model.priors]
     prior = joint_prior(draws.of_bodies(names))
     robot = model.robot
@@ -113,7 +131,15 @@ def updated_model(model: Model, draws: InertialDraws) -> Model:
 
 
 def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
-    """Return the normal distribution of a plan's coordinates that fits draws of all uncertain bodies."""
+    """Return the normal distribution of a plan's coordinates that fits draws of all uncertain bodies.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+        Unknowns of the plan.
+    draws : InertialDraws
+        Draws of all its uncertain bodies.
+    """
     values = draws.of_bodies([body.name for body in unknowns.bodies]).values
     parts = [
         log_cholesky_coordinates(body.centre.pseudo_inertia, np.einsum("np,pij->nij", values[:, index], BASIS))
@@ -126,7 +152,15 @@ def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
 
 
 def bodies_of_draws(model: Model, draws: InertialDraws) -> dict[str, BodyDraws]:
-    """Return the draws of the reported quantities, by the name of the body to identify."""
+    """Return the draws of the reported quantities, by the name of the body to identify.
+
+    Parameters
+    ----------
+    model : Model
+        Model that names the bodies to identify.
+    draws : InertialDraws
+        Draws that contain these bodies.
+    """
     names = [prior.name for prior in model.bodies]
     values = draws.of_bodies(names).values
     return {name: BodyDraws(name, mass_com_inertia(values[:, index])) for index, name in enumerate(names)}

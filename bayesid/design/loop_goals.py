@@ -172,8 +172,8 @@ class TipRegion(_Smaller):
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the semi-axis from draws of what is known."""
         rng = np.random.default_rng(knowledge.seed)
-        found = predict(knowledge.model, knowledge.flown, rng, draws=DRAWS, tip_frame=self.frame)
-        return float(np.max(found.tip.pose().millimetres.semi_axes)) * 1e-3
+        prediction = predict(knowledge.model, knowledge.flown, rng, draws=DRAWS, tip_frame=self.frame)
+        return float(np.max(prediction.tip.pose().millimetres.semi_axes)) * 1e-3
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,14 @@ class CauseProbability:
 
 
 def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
-    """Return the entry of a goal in loop.json."""
+    """Return the entry of a goal in loop.json.
+
+    Parameters
+    ----------
+    goal : Goal
+    value : float
+        Value reached, in the goal's unit.
+    """
     return {"goal": goal.text, "value": value, "wanted": goal.target, "unit": goal.unit, "reached": goal.reached(value)}
 
 

@@ -18,6 +18,12 @@ __all__ = ["History"]
 
 # stages of a step, in their order; a loop that is reviewed has the diagnosis as well
 STAGES = ("plan", "recording", "identification")
+ENDING = {  # ending of the file name, by stage
+    "plan": "plan.csv",
+    "recording": "recording.csv",
+    "identification": "posterior.nc",
+    "diagnosis": "diagnosis.json",
+}
 
 
 @dataclass
@@ -54,22 +60,58 @@ class History:
         return history
 
     def path(self, number: int, stage: str) -> Path:
-        """Return the path of the file of a stage of a step; steps count from 1."""
-        return self.folder / f"step-{number}-{_ENDING[stage]}"
+        """Return the path of the file of a stage.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        stage : str
+            Name of the stage, one of `stages`.
+        """
+        return self.folder / f"step-{number}-{ENDING[stage]}"
 
     def entry(self, number: int, stage: str) -> dict[str, Any] | None:
-        """Return the entry of a stage, None if the stage is not done."""
+        """Return the entry of a stage, None if the stage is not done.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        stage : str
+            Name of the stage, one of `stages`.
+        """
         return self.steps[number - 1].get(stage) if number <= len(self.steps) else None
 
     def record(self, number: int, stage: str, entry: dict[str, Any]) -> None:
-        """Record that a stage is done, with its entry; its file must be complete."""
+        """Record that a stage is done, with its entry; its file must be complete.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        stage : str
+            Name of the stage, one of `stages`.
+        entry : dict
+            Entry of the stage.
+        """
         if number > len(self.steps):
             self.steps.append({"step": number})
         self.steps[number - 1][stage] = {**entry, **self._mark(number, stage)}
         self.write()
 
     def note(self, number: int, name: str, content: Any) -> None:
-        """Note something that follows from the stages of a step, and is computed anew whenever the loop is run."""
+        """Note something that follows from the stages of a step, and is computed anew whenever the loop is run.
+
+        Parameters
+        ----------
+        number : int
+            Number of the step, from 1.
+        name : str
+            Key of the note in the step's entry.
+        content
+            What is noted, as JSON writes it.
+        """
         self.steps[number - 1][name] = content
         self.write()
 
@@ -111,12 +153,3 @@ class History:
                 self.steps.append(kept)
             if len(kept) <= len(self.stages):
                 return
-
-
-# endings of the file names, by stage
-_ENDING = {
-    "plan": "plan.csv",
-    "recording": "recording.csv",
-    "identification": "posterior.nc",
-    "diagnosis": "diagnosis.json",
-}

@@ -60,7 +60,7 @@ class Plan:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what the plan is made of, without anything derived."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def unknowns(self) -> Unknowns:

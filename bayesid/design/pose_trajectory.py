@@ -178,14 +178,22 @@ class Pose:
         """
         mean = Rotation.from_quat(self.mean_attitude)
         rotation = np.degrees((mean * Rotation.from_quat(self.start).inv()).as_rotvec())
-        return replace(Region.of(self.turns(self.attitude)), mean=rotation)
+        return replace(Region.of(self._turns(self.attitude)), mean=rotation)
 
-    def turns(self, attitude: Floats) -> Floats:
+    def _turns(self, attitude: Floats) -> Floats:
         """Return the rotation vectors (..., 3) from the mean to attitudes (..., 4), orbit axes [degrees]."""
         mean = Rotation.from_quat(self.mean_attitude)
         return np.degrees((Rotation.from_quat(attitude) * mean.inv()).as_rotvec())
 
     def holds(self, position: Floats, attitude: Floats) -> tuple[bool, bool]:
-        """Return whether the region of the position contains a position [m], and that of the rotation an attitude."""
+        """Return whether the region of the position contains a position [m], and that of the rotation an attitude.
+
+        Parameters
+        ----------
+        position : (..., 3) array
+            Positions in orbit axes [m].
+        attitude : (..., 4) array
+            Quaternions x, y, z, w from body axes to orbit axes.
+        """
         rotation = replace(self.degrees, mean=np.zeros(3))
-        return bool(self.millimetres.holds(1e3 * position)), bool(rotation.holds(self.turns(attitude)))
+        return bool(self.millimetres.holds(1e3 * position)), bool(rotation.holds(self._turns(attitude)))

@@ -111,7 +111,15 @@ def planned_posterior(
 
 
 def simulated(posterior: Posterior, z: Floats) -> Posterior:
-    """Return the posterior with readings that the coordinates ``z`` predict, without noise."""
+    """Return the posterior with readings that some coordinates predict, without noise.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Posterior whose readings are replaced.
+    z : (n,) array
+        Coordinates of the unknowns.
+    """
     recordings = simulate_recordings(posterior, z=z)
     return with_manoeuvres(
         posterior,

@@ -55,6 +55,12 @@ def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
     """Draw parameters and shrink them towards the centre until they fill a random fraction of the tightest limit.
 
     Only limits that a smaller motion helps to keep are considered.
+
+    Parameters
+    ----------
+    problem : Problem
+    rng : numpy.random.Generator
+        Source of direction and size.
     """
     family = problem.plan.family
     direction = family.scale * rng.normal(size=family.size)
@@ -97,7 +103,16 @@ def _like_the_paper(family: TrajectoryFamily, rng: np.random.Generator) -> Float
 
 
 def within_limits(problem: Problem, parameters: Floats, bound: float = 1.0) -> bool:
-    """Return whether parameters keep all limits times a factor, on the grid of the search."""
+    """Return whether parameters keep all limits times a factor, on the grid of the search.
+
+    Parameters
+    ----------
+    problem : Problem
+    parameters : (n,) array
+        Motion in its family.
+    bound : float
+        Factor on the limits.
+    """
     return bool(problem.fractions(parameters)[0].max() <= bound + SLACK)
 
 
@@ -125,13 +140,13 @@ def repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) ->
     # a slightly lower bound, so that the result lies inside the limits
     bound -= 2e-3
     options: Any = {"ftol": 1e-12, "gtol": 1e-7, "maxiter": 60}
-    found = family.centre + family.scale * minimize(excess, x, jac=True, method="L-BFGS-B", options=options).x
+    kept = family.centre + family.scale * minimize(excess, x, jac=True, method="L-BFGS-B", options=options).x
     for _ in range(SHRUNK):
-        largest = problem.fractions(found)[0][problem.shrinkable].max()
+        largest = problem.fractions(kept)[0][problem.shrinkable].max()
         if largest <= bound + 2e-3:
             break
-        found = family.centre + np.clip(0.97 * bound / largest, 0.1, 0.9) * (found - family.centre)
-    return found
+        kept = family.centre + np.clip(0.97 * bound / largest, 0.1, 0.9) * (kept - family.centre)
+    return kept
 
 
 def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
@@ -188,8 +203,8 @@ def reacting_swing(problem: Problem, rng: np.random.Generator) -> Floats:
     swing = rng.uniform(*FILLED) * speed / paper.frequency
     size = np.linalg.norm(swing)
     lower, upper = _ranges(robot)
-    room = np.min(np.minimum(upper - posture, posture - lower)[moving] / np.maximum(np.abs(swing) / size, 1e-3))
-    swing *= min(1.0, max(room, LEAST) / size)
+    clearance = np.min(np.minimum(upper - posture, posture - lower)[moving] / np.maximum(np.abs(swing) / size, 1e-3))
+    swing *= min(1.0, max(clearance, LEAST) / size)
     return family.nearest(paper.motion(np.stack([posture[moving], swing], axis=1).ravel()))
 
 
@@ -257,9 +272,9 @@ def _largest(problem: Problem, postures: Floats, moving: Integers) -> tuple[Floa
     turned = base_rates(robot, postures)
     gain = turned.swapaxes(1, 2) @ turned
     inner = np.ix_(moving, moving)
-    found = [eigh(one[inner], other[inner]) for one, other in zip(gain, cost, strict=True)]
-    squares = np.array([values[-1] for values, _ in found])
-    return np.sqrt(np.maximum(squares, 0.0)), np.array([vectors[:, -1] for _, vectors in found])
+    pairs = [eigh(g[inner], c[inner]) for g, c in zip(gain, cost, strict=True)]
+    squares = np.array([values[-1] for values, _ in pairs])
+    return np.sqrt(np.maximum(squares, 0.0)), np.array([vectors[:, -1] for _, vectors in pairs])
 
 
 def _unit_speeds(postures: Floats) -> JointState:

@@ -85,7 +85,18 @@ class PlannedMotion:
 
 
 def plan_recording(motion: Motion, robot: Robot, time: Floats, name: str) -> Recording:
-    """Return a motion as the plan that a spacecraft executes."""
+    """Return a motion as the plan that a spacecraft executes.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of all joints.
+    robot : Robot
+    time : (T,) array
+        Times of the samples [s].
+    name : str
+        Name of the recording.
+    """
     state = motion.evaluate(time)
     channels = {
         f"{family}.{joint.name}": values[:, index]

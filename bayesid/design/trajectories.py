@@ -69,11 +69,27 @@ class TrajectoryFamily:
     imitates: bool = False
 
     def position(self, parameters: Array, time: Array) -> Array:
-        """Return the positions of all joints at one instant, shape (joints,) [rad or m], computed in JAX."""
+        """Return the positions of all joints at one instant, shape (joints,) [rad or m], computed in JAX.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Parameters of the motion.
+        time : scalar array
+            Instant [s].
+        """
         raise NotImplementedError
 
     def state(self, parameters: Array, time: Floats) -> JointState:
-        """Return positions, velocities and accelerations, each (T, joints), differentiable in the parameters."""
+        """Return positions, velocities and accelerations, each (T, joints), differentiable in the parameters.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Parameters of the motion.
+        time : (T,) array
+            Instants [s].
+        """
 
         def speed(t: Array) -> Array:
             return jax.jvp(lambda s: self.position(parameters, s), (t,), (jnp.ones(()),))[1]
@@ -86,8 +102,16 @@ class TrajectoryFamily:
         return JointState(*cast("list[Floats]", parts))
 
     def slopes(self, parameters: Array, time: Floats) -> Array:
-        """Return the derivatives of position, velocity and acceleration, shape (3, T, joints, n)."""
-        return jnp.stack(jax.jacfwd(lambda own: tuple(self.state(own, time)))(jnp.asarray(parameters)))
+        """Return the derivatives of position, velocity and acceleration, shape (3, T, joints, n).
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Parameters of the motion.
+        time : (T,) array
+            Instants [s].
+        """
+        return jnp.stack(jax.jacfwd(lambda p: tuple(self.state(p, time)))(jnp.asarray(parameters)))
 
     @property
     def size(self) -> int:

@@ -80,7 +80,17 @@ def base_quantities(instant: Instant, start: BaseAtStart, tip: Array) -> Array:
 
 
 def trajectory_of(time: Floats, joints: JointState, base: Array) -> Trajectory:
-    """Return the trajectory of joints with the quantities ``base``, shape (T, 18), or its change with (T, 18, n)."""
+    """Return a trajectory, or its change, from the motion of the joints and the quantities of the base.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Instants [s].
+    joints : JointState
+        Motion of the joints, or its change.
+    base : (T, 18) or (T, 18, n) array
+        Quantities as of `base_quantities`, or their change along n directions.
+    """
     tip_speed, tip_rate, rotation = (base[:, index] for index in range(3))
     excursion, rate, change, acceleration = (base[:, a:b] for a, b in ((3, 9), (9, 12), (12, 15), (15, 18)))
     position, velocity = jnp.asarray(joints.position), jnp.asarray(joints.velocity)

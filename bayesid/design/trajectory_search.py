@@ -27,7 +27,7 @@ from bayesid.design.design_problem import Problem
 from bayesid.design.refine import Refined, Shared, Task, fitted_to_fine_limits, refine
 from bayesid.design.search_starts import SLACK, exchanged, random_start, reacting_swing
 
-__all__ = ["THOROUGH", "Found", "Search", "Store", "optimise"]
+__all__ = ["THOROUGH", "Search", "SearchResult", "Store", "optimise"]
 
 REACTING = 2.0 / 3.0  # fraction of the starts that are swings to which the base reacts much, where the family is linear
 FOLLOWED = 3  # number of motions that are followed to the end, unless there are fewer
@@ -74,7 +74,7 @@ THOROUGH = Search(exchanges=36, loosened=3.0)
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Outcome of a search."""
 
     parameters: Floats  #: (n,) parameters of the best motion
@@ -95,7 +95,7 @@ def optimise(
     known: Callable[[str], Kept | None] = lambda descent: None,
     keep: Callable[[str, Floats, float, int], None] = lambda descent, parameters, cost, evaluations: None,
     progress: Progress = silent,
-) -> Found:
+) -> SearchResult:
     """Minimise a criterion within the limits.
 
     Parameters
@@ -137,13 +137,14 @@ def optimise(
     pool = work.run(0, first_round, search.tolerance, points[:1], loosened)
     for number in range(-(-search.exchanges // GENERATION)):
         size = min(GENERATION, search.exchanges - number * GENERATION)
-        best = [item.parameters for item in _ranked(pool, problem)[:PARENTS]]
-        children = [exchanged(problem, best, rng) for _ in range(size)]
+        parents = [descent.parameters for descent in _ranked(pool, problem)[:PARENTS]]
+        children = [exchanged(problem, parents, rng) for _ in range(size)]
         pool += work.run(2 + number, children, search.tolerance, points[:1])
-    last = [item.parameters for item in _ranked(pool, problem)[:followed]] if pool else starts
+    last = [descent.parameters for descent in _ranked(pool, problem)[:followed]] if pool else starts
     ends = work.run(1, last, FINISH * search.tolerance, points)
-    alive = _ranked(work.fitted(ends, FINISH * search.tolerance, points), problem)
-    return Found(alive[0].parameters, alive[0].cost, tuple(item.cost for item in alive), work.evaluations)
+    optimum, *others = _ranked(work.fitted(ends, FINISH * search.tolerance, points), problem)
+    costs = (optimum.cost, *(descent.cost for descent in others))
+    return SearchResult(optimum.parameters, optimum.cost, costs, work.evaluations)
 
 
 def _start(problem: Problem, rng: np.random.Generator) -> Floats:
@@ -161,9 +162,9 @@ def _ranked(done: Sequence[Refined], problem: Problem) -> list[Refined]:
         If nothing keeps the limits; the message names the broken ones.
     """
     ranked: list[Refined] = []
-    for item in sorted((item for item in done if np.isfinite(item.cost)), key=lambda item: item.cost):
-        if not ranked or item.cost - ranked[-1].cost > ALIKE * min(abs(item.cost), 1.0):
-            ranked.append(item)
+    for descent in sorted((one for one in done if np.isfinite(one.cost)), key=lambda one: one.cost):
+        if not ranked or descent.cost - ranked[-1].cost > ALIKE * min(abs(descent.cost), 1.0):
+            ranked.append(descent)
     if not ranked:
         raise InputError(
             f"no manoeuvre of the family {problem.plan.family.name!r} was found within the limits: "
@@ -223,7 +224,7 @@ class _Work:
             for end in ends
             if np.isfinite(end.cost)
         ]
-        self.evaluations += sum(item.evaluations for item in kept)
+        self.evaluations += sum(descent.evaluations for descent in kept)
         return kept or list(ends)
 
     def _each(self, tasks: dict[int, Task]):  # type: ignore[no-untyped-def]
@@ -294,6 +295,13 @@ class Store:
     def open(cls, file: Path, key: str) -> Store:
         """Read the results of an interrupted run with the same key, if there are any.
 
+        Parameters
+        ----------
+        file : Path
+            JSON file of the results.
+        key : str
+            Key of the design problem.
+
         Raises
         ------
         InputError
@@ -329,7 +337,19 @@ class Starts:
         return None if entry is None else (np.array(entry[0]), float(entry[1]), int(entry[2]))
 
     def keep(self, descent: str, parameters: Floats, cost: float, evaluations: int) -> None:
-        """Add the result of a descent, and write the file."""
+        """Add the result of a descent, and write the file.
+
+        Parameters
+        ----------
+        descent : str
+            Name of the descent.
+        parameters : (n,) array
+            Parameters of its end.
+        cost : float
+            Cost there.
+        evaluations : int
+            Number of evaluations of the cost.
+        """
         with self.store.lock:
             results = self.store.results.setdefault(self.search, {})
             results[descent] = ([float(value) for value in parameters], float(cost), evaluations)

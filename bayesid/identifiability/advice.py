@@ -44,7 +44,7 @@ WORST = 3
 
 KNOWN_MASS = 0.01  # relative standard deviation of a mass that counts as known
 # acceleration [m/s2] and angular acceleration [rad/s2] of the whole robot by a pulse of thrust and of torque
-PUSH, TURN = 1e-3, 1e-4
+THRUST, TURN = 1e-3, 1e-4
 SPIN = 2e-3  # change of the robot's angular velocity by a pulse of the wheels [rad/s]
 SWING = {"rad": 0.5, "m": 0.2}  # amplitude of an added swing of a revolute joint [rad] and of a prismatic one [m]
 SHARE = 0.9  # largest fraction of a joint's speed limit that an added swing may reach, so that it keeps a margin
@@ -115,12 +115,12 @@ def advise(
             advice.append(Advice(candidate.name, candidate.text, reason=str(error)))
             continue
         advice.append(_of(candidate, known, worst, now))
-    return sorted(advice, key=lambda item: (bool(item.reason), item.directions[:1], -item.information))
+    return sorted(advice, key=lambda one: (bool(one.reason), one.directions[:1], -one.information))
 
 
 def _of(candidate: AddedMeasurement, known: Knowledge, worst: Sequence[Direction], now: Knowledge) -> Advice:
     index = int(np.argmin(now.shrinkage))
-    ratios = tuple(float(np.linalg.norm(item.weights @ known.factor)) / item.prior_sd for item in worst[:WORST])
+    ratios = tuple(float(np.linalg.norm(one.weights @ known.factor)) / one.prior_sd for one in worst[:WORST])
     return Advice(
         name=candidate.name,
         text=candidate.text,
@@ -155,7 +155,7 @@ class AddedMeasurement:
 def candidates(model: Model) -> list[AddedMeasurement]:
     """Return all candidates for a model."""
     mass, inertia = _whole(model.robot)
-    force, torque, spin = _round(PUSH * mass), _round(TURN * inertia), _round(SPIN * inertia)
+    force, torque, spin = _round(THRUST * mass), _round(TURN * inertia), _round(SPIN * inertia)
     declared = {sensor.kind: sensor for sensor in model.sensors}
     each = "x, y and z in turn, each for a tenth of the manoeuvre"
     additions = [
@@ -187,12 +187,12 @@ def candidates(model: Model) -> list[AddedMeasurement]:
     return [
         *additions,
         AddedMeasurement(
-            "thrust", f"known thrust of {force:g} N along {each}", partial(_pushed, np.array([force, 0.0]))
+            "thrust", f"known thrust of {force:g} N along {each}", partial(_with_pulses, np.array([force, 0.0]))
         ),
         AddedMeasurement(
-            "torque", f"known torque of {torque:g} N m about {each}", partial(_pushed, np.array([0.0, torque]))
+            "torque", f"known torque of {torque:g} N m about {each}", partial(_with_pulses, np.array([0.0, torque]))
         ),
-        AddedMeasurement("wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun, spin)),
+        AddedMeasurement("wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun_up, spin)),
         AddedMeasurement("twice", "every manoeuvre flown twice", lambda experiment: replace(experiment, times=2)),
         *(
             AddedMeasurement(
@@ -228,9 +228,9 @@ def _weighed(body: str, experiment: Experiment) -> Experiment:
 # ---- actions on the base ----
 
 
-def _pushed(size: Floats, experiment: Experiment) -> Experiment:
+def _with_pulses(size: Floats, experiment: Experiment) -> Experiment:
     """Return the experiment with pulses of force and torque of the two sizes [N, N m] in every manoeuvre."""
-    return replace(experiment, manoeuvres=tuple(_with_wrench(item, size) for item in experiment.manoeuvres))
+    return replace(experiment, manoeuvres=tuple(_with_wrench(flown, size) for flown in experiment.manoeuvres))
 
 
 def _with_wrench(manoeuvre: Manoeuvre, size: Floats) -> Manoeuvre:
@@ -245,8 +245,8 @@ def _with_wrench(manoeuvre: Manoeuvre, size: Floats) -> Manoeuvre:
     return _with_channels(manoeuvre, {"base_force": rows[:, :3], "base_torque": rows[:, 3:]})
 
 
-def _spun(size: float, experiment: Experiment) -> Experiment:
-    return replace(experiment, manoeuvres=tuple(_with_wheels(item, size) for item in experiment.manoeuvres))
+def _spun_up(size: float, experiment: Experiment) -> Experiment:
+    return replace(experiment, manoeuvres=tuple(_with_wheels(flown, size) for flown in experiment.manoeuvres))
 
 
 def _with_wheels(manoeuvre: Manoeuvre, size: float) -> Manoeuvre:
@@ -302,7 +302,7 @@ class Swung(MeasuredMotion):
 
 
 def _swung(robot: Robot, index: int, experiment: Experiment) -> Experiment:
-    return replace(experiment, manoeuvres=tuple(_with_swing(robot, index, item) for item in experiment.manoeuvres))
+    return replace(experiment, manoeuvres=tuple(_with_swing(robot, index, flown) for flown in experiment.manoeuvres))
 
 
 def _with_swing(robot: Robot, index: int, manoeuvre: Manoeuvre) -> Manoeuvre:

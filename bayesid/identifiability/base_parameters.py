@@ -39,12 +39,10 @@ __all__ = [
     "Base",
     "BaseParameters",
     "base_parameters",
-    "checked_rank",
     "equilibrated",
     "massive_bodies",
     "random_motion",
     "regrouping",
-    "spanning",
     "stacked_regressor",
     "standard_names",
 ]
@@ -79,6 +77,14 @@ def random_motion(robot: Robot, count: int, rng: np.random.Generator) -> Kinemat
     """Draw random joint states with unit standard deviations of speed and acceleration.
 
     Revolute joints are drawn anywhere on the circle, prismatic joints with a standard deviation of 1 m about zero.
+
+    Parameters
+    ----------
+    robot : Robot
+    count : int
+        Number of states.
+    rng : numpy.random.Generator
+        Source of the states.
     """
     position, velocity, acceleration = rng.normal(size=(3, count, len(robot.joints)))
     turning = np.array([joint.kind != "prismatic" for joint in robot.joints], dtype=bool)
@@ -145,7 +151,7 @@ def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:
     return matrix / length, length
 
 
-def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
+def _spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
     """Return the indices of the columns, taken in the given order, that the columns before them do not span.
 
     Parameters
@@ -167,7 +173,7 @@ def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
     return chosen
 
 
-def checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
+def _checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
     """Check a rank, and return the last singular value kept and the first dropped, relative to the largest.
 
     Parameters
@@ -336,9 +342,9 @@ def base_parameters(
     moving = np.linalg.norm(scaled, axis=0) > ZERO
     preferred = [names.index(name) for name in (*keep, *_preferred(robot, bodies))]
     order = [index for index in dict.fromkeys(preferred) if moving[index]]
-    independent = sorted(spanning(scaled, order))
+    independent = sorted(_spanning(scaled, order))
     dependent = sorted(set(order) - set(independent))
-    gap = checked_rank(scaled[:, moving], len(independent))
+    gap = _checked_rank(scaled[:, moving], len(independent))
     beta = regrouping(scaled, independent, dependent)
     return BaseParameters(
         standard=names,

@@ -92,7 +92,7 @@ def directions(knowledge: Knowledge) -> list[Direction]:
     return result
 
 
-def common_factor(names: tuple[str, ...], values: Floats) -> Floats:
+def _common_factor(names: tuple[str, ...], values: Floats) -> Floats:
     """Return the change of all quantities when masses and inertias grow in proportion, shape (n,)."""
     fixed = np.array([name.split(".")[-2] == "com" for name in names])
     return np.where(fixed, 0.0, values)
@@ -104,7 +104,7 @@ def _readable(axes: Floats, ratios: Floats, knowledge: Knowledge) -> Floats:
     if count == 0:
         return axes
     space, rest = axes[:, :count], axes[:, count:]
-    scale = np.linalg.solve(knowledge.prior_factor, common_factor(knowledge.names, knowledge.values))
+    scale = np.linalg.solve(knowledge.prior_factor, _common_factor(knowledge.names, knowledge.values))
     inside = space.T @ (scale / np.linalg.norm(scale))
     first = np.zeros((len(axes), 0))
     bodies = len(knowledge.names) // len(BODY_QUANTITIES)
@@ -173,20 +173,20 @@ def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool 
     moved = direction.displacement / prior_sd
     bodies = list(dict.fromkeys(name.split(".")[0] for name in direction.names))
     owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])
-    factor = common_factor(direction.names, values)
+    factor = _common_factor(direction.names, values)
     if len(bodies) > 1 and _cosine(moved, factor / prior_sd) > ALIKE:
         return "all masses and inertias in proportion (the scale)" if whole else f"{joined(bodies)} in proportion"
     for index, body in enumerate(bodies):
         if _cosine(moved, np.where(owner == index, factor, 0.0) / prior_sd) > ALIKE:
             return f"mass and inertia of {body} in proportion"
     phrases: list[str] = []
-    for sign, name in parts_of(direction, prior_sd):
+    for sign, name in _parts_of(direction, prior_sd):
         text = _noun(name, len(bodies) > 1)
         phrases.append(text if not phrases else f"{sign.value} {text}")
     return " ".join(phrases)
 
 
-def parts_of(direction: Direction, prior_sd: Floats) -> list[tuple[Part, str]]:
+def _parts_of(direction: Direction, prior_sd: Floats) -> list[tuple[Part, str]]:
     """Return the largest parts of a displacement in units of the prior's widths, with signs relative to the first."""
     moved = direction.displacement / prior_sd
     order = np.argsort(-np.abs(moved))[:NAMED]
@@ -229,14 +229,14 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
         (ContractionVerdict.NOT, "is the prior"),
         (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),
     ):
-        names = [name for name, item in result.contraction.items() if item.verdict is verdict]
+        names = [name for name, contraction in result.contraction.items() if contraction.verdict is verdict]
         if names:
             sentences.append(f"What is said of {abridged(names)} {text}.")
     knowledge = Knowledge.at(result.posterior, result.optimum.z)
     subjects = [
-        subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
-        for item in directions(knowledge)
-        if item.verdict is ContractionVerdict.NOT
+        subject(direction, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
+        for direction in directions(knowledge)
+        if direction.verdict is ContractionVerdict.NOT
     ]
     if subjects:
         sentences.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")

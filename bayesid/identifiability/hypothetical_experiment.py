@@ -18,7 +18,17 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Noise, Scaled, Sensor, SensorKind, White
 
-__all__ = ["TYPICAL", "Experiment", "InformationPredictor", "blanked", "rescaled", "typical_torque"]
+__all__ = [
+    "FINEST",
+    "TYPICAL",
+    "Experiment",
+    "InformationPredictor",
+    "blanked",
+    "has",
+    "rescaled",
+    "scaled",
+    "typical_torque",
+]
 
 TYPICAL: dict[SensorKind, Sensor] = {
     SensorKind.RATE: Sensor(SensorKind.RATE, White(1e-5)),
@@ -101,7 +111,16 @@ class InformationPredictor:
 
 
 def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSensor | None = None) -> Manoeuvre:
-    """Return a manoeuvre with placeholder samples for the sensors that its recording lacks, to be simulated."""
+    """Return a manoeuvre with placeholder samples for the sensors that its recording lacks, to be simulated.
+
+    Parameters
+    ----------
+    manoeuvre : Manoeuvre
+    sensors : tuple of Sensor
+        Sensors that the manoeuvre is to have.
+    torque : TorqueSensor, optional
+        Torque sensor that it is to have.
+    """
     recording = manoeuvre.recording
     present = [sensor.kind for sensor in sensors if has(recording, sensor.kind)]
     when = np.ones(len(recording.time), dtype=bool)
@@ -118,12 +137,26 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSen
 
 
 def has(recording: Recording, kind: SensorKind) -> bool:
-    """Return whether a recording holds the channels of a kind of sensor."""
+    """Return whether a recording holds the channels of a kind of sensor.
+
+    Parameters
+    ----------
+    recording : Recording
+    kind : SensorKind
+        Kind of the sensor.
+    """
     return kind.columns[0] in recording.channels
 
 
 def scaled(sensor: Sensor, factor: float) -> Sensor:
-    """Return a sensor with its noise multiplied by a factor."""
+    """Return a sensor with its noise multiplied by a factor.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    factor : float
+        Factor on the standard deviation of the noise.
+    """
     noise: Noise = Scaled(sensor.noise, (factor, factor, factor))
     return replace(sensor, noise=noise)
 
@@ -137,7 +170,14 @@ def typical_torque(model: Model) -> TorqueSensor | None:
 
 
 def rescaled(sensor: TorqueSensor, factor: float) -> TorqueSensor:
-    """Return a torque sensor with its noise multiplied by a factor."""
+    """Return a torque sensor with its noise multiplied by a factor.
+
+    Parameters
+    ----------
+    sensor : TorqueSensor
+    factor : float
+        Factor on the standard deviation of the noise.
+    """
     return replace(sensor, sigma=tuple(factor * sigma for sigma in sensor.sigma))
 
 

@@ -45,7 +45,15 @@ class Knowledge:
 
     @classmethod
     def at(cls, posterior: Posterior, z: Floats) -> Knowledge:
-        """Return the knowledge of a posterior linearised at the coordinates ``z``, shape (N,)."""
+        """Return the knowledge of a posterior linearised at some coordinates.
+
+        Parameters
+        ----------
+        posterior : Posterior
+            Posterior with its noise linearised.
+        z : (N,) array
+            Coordinates of the linearisation.
+        """
         return cls(*linearise(posterior, z), posterior.jacobian(z))
 
     def having(self, rows: Floats) -> Knowledge:

@@ -97,7 +97,15 @@ class ParameterRow:
 
 
 def tabulate(knowledge: Knowledge, draws: Draws) -> list[ParameterRow]:
-    """Return the row of every quantity, without profiles."""
+    """Return the row of every quantity, without profiles.
+
+    Parameters
+    ----------
+    knowledge : Knowledge
+        Linearisation at the mode.
+    draws : Draws
+        Draws from the posterior.
+    """
     errors, correlation, conditional = shape_errors(draws, knowledge), knowledge.correlation, knowledge.conditional_sd
     mean, sd = draws.mean, np.sqrt(np.diag(draws.covariance))
     units = list(BODY_QUANTITIES.values())
@@ -151,7 +159,7 @@ def profiled(
     """
     errors = shape_errors(draws, knowledge)
     if not draws.trusted:  # the profile of an unlearnt quantity is the prior
-        told = np.array([item.verdict is not ContractionVerdict.NOT for item in parameters])
+        told = np.array([row.verdict is not ContractionVerdict.NOT for row in parameters])
         errors = told - knowledge.shrinkage
     order = [int(k) for k in np.argsort(-errors) if not parameters[int(k)].normal][:most]
     result = list(parameters)
@@ -165,7 +173,14 @@ def profiled(
 
 
 def quantity_of(posterior: Posterior, index: int) -> Target:
-    """Return one reported quantity of the bodies, by its index, as a function of the coordinates."""
+    """Return one reported quantity of the bodies, by its index, as a function of the coordinates.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    index : int
+        Index of the quantity among those of all bodies.
+    """
     unknowns = posterior.unknowns
     return Target(lambda z: float(quantities_at(unknowns, z)[index]), lambda z: quantity_slopes_at(unknowns, z)[index])
 
@@ -239,6 +254,13 @@ def shape_errors(draws: Draws, knowledge: Knowledge) -> Floats:
     """Return the largest differences between quantiles of the draws and of the normal approximation.
 
     They are in standard deviations of the normal approximation, shape (n,).
+
+    Parameters
+    ----------
+    draws : Draws
+        Draws of the n quantities.
+    knowledge : Knowledge
+        Normal approximation of the same quantities.
     """
     errors = [
         np.abs((weighted_quantile(draws.values, draws.weights, level) - knowledge.values) / knowledge.sd - normal)

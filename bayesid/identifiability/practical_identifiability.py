@@ -67,7 +67,7 @@ class Practical:
                 "trusted": self.draws.trusted,
                 "pareto_k": self.draws.pareto_k,
             },
-            "advice": [item.to_dict() for item in self.advice],
+            "advice": [advice.to_dict() for advice in self.advice],
         }
 
 
@@ -103,7 +103,7 @@ def practical(
     knowledge = Knowledge.at(posterior, optimum.z)
     ordered = tuple(directions(knowledge))
     whole = covers_all(posterior)
-    words = tuple(describe(item, knowledge.values, knowledge.prior_sd, whole) for item in ordered)
+    words = tuple(describe(one, knowledge.values, knowledge.prior_sd, whole) for one in ordered)
     draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, part_of(progress, 0.1, 0.4))
     parameters = tabulate(knowledge, draws)
     parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, part_of(progress, 0.4, 0.6))

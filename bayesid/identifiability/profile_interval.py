@@ -78,7 +78,7 @@ def profile(residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats
     target : Target
         Quantity to profile.
     """
-    fit = _Held(residual, jacobian, mode, covariance, target)
+    fit = _ConstrainedFit(residual, jacobian, mode, covariance, target)
     points = [*fit.march(-1.0)[::-1], _Point(target.value(mode), 0.0, mode), *fit.march(1.0)]
     for root in (sign * level for level in LEVELS.values() for sign in (-1.0, 1.0)):
         curve = _curve(_increasing(points))
@@ -95,7 +95,7 @@ class _Point(NamedTuple):
     z: Floats
 
 
-class _Held:
+class _ConstrainedFit:
     """Maximisation of the posterior with a quantity held by a penalty."""
 
     def __init__(self, residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> None:
@@ -105,17 +105,17 @@ class _Held:
         self.along = covariance @ slope / self.sd**2
         self.centre, self.best = target.value(mode), float((residual(mode) ** 2).sum())
 
-    def at(self, wanted: float, start: Floats) -> _Point:
+    def at(self, prescribed: float, start: Floats) -> _Point:
         """Return the fit with the quantity held near a value."""
         stiffness = STIFF / self.sd
 
-        def held(z: Floats) -> Floats:
-            return np.append(self.residual(z), stiffness * (self.target.value(z) - wanted))
+        def penalised(z: Floats) -> Floats:
+            return np.append(self.residual(z), stiffness * (self.target.value(z) - prescribed))
 
         def slope(z: Floats) -> Floats:
             return np.vstack([self.jacobian(z), stiffness * self.target.gradient(z)])
 
-        z = np.asarray(levenberg_marquardt(held, slope, start, TOLERANCE).x)
+        z = np.asarray(levenberg_marquardt(penalised, slope, start, TOLERANCE).x)
         value, loss = self.target.value(z), float((self.residual(z) ** 2).sum()) - self.best
         return _Point(value, float(np.sign(value - self.centre) * np.sqrt(max(loss, 0.0))), z)
 

@@ -245,7 +245,7 @@ def design_rows(designs: Sequence[Design]) -> Rows:
             format_fixed(design.predicted.log_det, 2),
             format_fixed(design.predicted.geometric_mean / reference.geometric_mean, 3),
             format_number(design.predicted.worst),
-            str(design.found.evaluations),
+            str(design.optimum.evaluations),
             _go(design.go),
         ]
         for design in designs

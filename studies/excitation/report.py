@@ -124,7 +124,7 @@ def _largest(contest: Contest) -> str:
 def _best_known(result: Result, crowd: Crowd) -> float:
     """Return the smallest cost by d-optimality that anything found."""
     repeated = [] if result.searches is None else [float(result.searches.costs.min())]
-    return min(crowd.cost, result.contest.designs["d-optimal"].found.cost, *repeated)
+    return min(crowd.cost, result.contest.designs["d-optimal"].optimum.cost, *repeated)
 
 
 def _largest_goal(text: str, result: Result, crowd: Crowd) -> Goal:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Self
 
@@ -77,7 +78,7 @@ class _OnLink(Placed):
                 f"effect {self.label!r}: the link is no body with volume",
                 remedy="Name the link with mass that it is fixed on",
             )
-        changed = self.copied()
+        changed = copy.copy(self)
         changed.factor, changed.vector = upper_cholesky(nominal.pseudo_inertia), nominal.vector
         return changed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import NamedTuple, Self, cast
 
@@ -51,7 +52,7 @@ class _DisplacedMotion(Effect):
         return [] if model.torque is not None else super().instances(model)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
-        """Return the change of the links' motion at T instants."""
+        """Return the change of the links' motion at T instants, with the parameters of `table`."""
         raise NotImplementedError
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
@@ -98,7 +99,7 @@ class EncoderOffset(_DisplacedMotion, OnJoint):
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the unit of its joint's position."""
-        changed = self.copied()
+        changed = copy.copy(self)
         unit = robot.joints[self.index_in(robot)].unit
         changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
         return changed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Self
 
@@ -109,8 +110,7 @@ class _Vibration(Effect):
 
     def tuned(self, values: Floats) -> Self:
         """Return the effect with an integration step that suits the frequency among the values."""
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__)
+        changed = copy.copy(self)
         changed.frequency = float(values[[parameter.name for parameter in self.parameters].index("frequency")])
         return changed
 
@@ -212,8 +212,7 @@ class FuelSlosh(_Vibration):
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the position of the tank bounded by the spacecraft."""
         centre, reach = _spacecraft_box(robot)
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__)
+        changed = copy.copy(self)
         changed.parameters = (
             *self.parameters[:3],
             *(

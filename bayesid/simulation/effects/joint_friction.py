@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Self
 
@@ -47,7 +48,7 @@ class _OnTorque(OnJoint):
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the index of its joint in the robot."""
-        changed = self.copied()
+        changed = copy.copy(self)
         changed.index = self.index_in(robot)
         if robot.joints[changed.index].kind == "prismatic":
             changed.parameters = tuple(

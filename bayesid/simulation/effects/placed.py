@@ -27,12 +27,6 @@ class Placed(Effect):
         """Name of the effect and of its place, separated by a colon."""
         return f"{self.name}:{self.place}"
 
-    def copied(self) -> Self:
-        """Return a copy whose attributes may be changed."""
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__)
-        return changed
-
 
 class OnJoint(Placed):
     """Effect at one joint."""
