@@ -45,10 +45,10 @@ def _parabolic_slopes(step: Array, slope: Array) -> Array:
     The first and the last sample, after which only padding follows, have the parabola of their nearest three.
     """
     left, right = step[:-1], step[1:]
-    both = jnp.where(left + right > 0.0, left + right, 1.0)
-    middle = (right * slope[:-1] + left * slope[1:]) / both
-    first = slope[:1] + (slope[:1] - slope[1:2]) * left[:1] / both[:1]
-    after = slope[1:] + (slope[1:] - slope[:-1]) * right / both  # of each parabola at its last sample
+    span = jnp.where(left + right > 0.0, left + right, 1.0)
+    middle = (right * slope[:-1] + left * slope[1:]) / span
+    first = slope[:1] + (slope[:1] - slope[1:2]) * left[:1] / span[:1]
+    after = slope[1:] + (slope[1:] - slope[:-1]) * right / span  # of each parabola at its last sample
     follows = jnp.concatenate([step[1:] > 0.0, jnp.zeros((1, 1), bool)])
     inner = jnp.concatenate([middle, after[-1:]])
     ending = jnp.concatenate([slope[:1], after])

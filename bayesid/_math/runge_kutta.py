@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-__all__ = ["STAGE_TIMES", "TABLEAU", "runge_kutta_stages", "runge_kutta_step", "stage_inputs"]
+__all__ = ["STAGE_TIMES", "TABLEAU", "runge_kutta_stages", "runge_kutta_step", "split_nodes", "stage_inputs"]
 
 G = TypeVar("G")
 """Type of the derivative's inputs at an instant."""
@@ -53,6 +53,15 @@ def runge_kutta_step(
     """
     states, slopes = runge_kutta_stages(derivative, state, size, stage_inputs(start, middle, end))
     return states[-1], slopes[0], slopes[-1]
+
+
+def split_nodes(nodes: G) -> tuple[G, G, G]:
+    """Return what stands at the beginnings, middles and ends of K steps, from arrays over their 2 K + 1 instants."""
+
+    def part(first: int, stop: int | None) -> G:
+        return jax.tree.map(lambda x: x[first:stop:2], nodes)
+
+    return part(0, -1), part(1, None), part(2, None)
 
 
 def stage_inputs(start: G, middle: G, end: G) -> G:

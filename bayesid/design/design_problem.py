@@ -121,11 +121,7 @@ class Problem:
     @cached_property
     def explained(self) -> Floats:
         """Directions of the readings that errors of the encoders could explain (`encoder_directions`), at rest."""
-        return self._explained_along(self.plan.family.centre)
-
-    def _explained_along(self, parameters: Floats) -> Floats:
-        """Return the directions of the readings that errors of the encoders could explain along a motion."""
-        samples = self.plan.samples
+        parameters, samples = self.plan.family.centre, self.plan.samples
         if not any(self.plan.encoder_sigma):
             return encoder_directions(self.plan, parameters, np.zeros((len(samples), 3)))
         fine = self.trajectory(parameters)

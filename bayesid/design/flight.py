@@ -74,7 +74,7 @@ class Flight:
 
     def information(self, explained: Array | None = None) -> Array:
         """Return the Fisher information of z, (n, n), given the sensors' white noise and the `encoder_directions`."""
-        slopes = self.reading_slopes()
+        slopes = self._reading_slopes()
         flat = slopes.reshape(-1, slopes.shape[-1])
         information = flat.T @ flat
         if explained is None or not explained.shape[1]:
@@ -82,7 +82,7 @@ class Flight:
         hidden = explained.T @ flat
         return information - hidden.T @ hidden
 
-    def reading_slopes(self) -> Array:
+    def _reading_slopes(self) -> Array:
         """Return the derivatives of the readings by z, in standard deviations of a sample, (samples, 3 sensors, n)."""
         plan, unknowns = self.plan, self.plan.unknowns
         simulator = plan.simulator
@@ -217,12 +217,13 @@ class Flight:
         robot, (pose, flow) = self.plan.model.robot, self._tip_motion
         moving = beyond(robot)[:, self.plan.tip.joint] if self.plan.tip.joint >= 0 else np.zeros(len(robot.joints))
         screw, screw_rate, _ = self._screws
-        pushed = screw @ pose[:, None]
-        turned = screw_rate @ pose[:, None] + screw @ flow[:, None]
+        pose_slope = screw @ pose[:, None]
+        flow_slope = screw_rate @ pose[:, None] + screw @ flow[:, None]
         by_position, by_velocity = by_joint[0] * moving[:, None], by_joint[1] * moving[:, None]
         parts = (
-            jnp.einsum("tjab,tjp->tabp", pushed, by_position),
-            jnp.einsum("tjab,tjp->tabp", turned, by_position) + jnp.einsum("tjab,tjp->tabp", pushed, by_velocity),
+            jnp.einsum("tjab,tjp->tabp", pose_slope, by_position),
+            jnp.einsum("tjab,tjp->tabp", flow_slope, by_position)
+            + jnp.einsum("tjab,tjp->tabp", pose_slope, by_velocity),
         )
         return jnp.concatenate([part[:, :3].reshape(len(pose), 12, -1) for part in parts], axis=1)
 

@@ -19,7 +19,7 @@ from jax import Array
 
 from bayesid._math.arrays import Traceable
 from bayesid._math.resampling import hermite
-from bayesid._math.runge_kutta import runge_kutta_stages, runge_kutta_step, stage_inputs
+from bayesid._math.runge_kutta import runge_kutta_stages, runge_kutta_step, split_nodes, stage_inputs
 from bayesid._math.small_matrices import cross, inertia_of, inverse, quaternion_rate, rotation, solve_small, symmetric
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
@@ -268,8 +268,8 @@ def linearise(
     def stages(state: Array, size: Array, hold: Array, *nodes: tuple[Array, Environment]) -> tuple[Array, Array]:
         inputs = stage_inputs(*nodes)
         states, _ = runge_kutta_stages(lambda s, at: slope(s, nothing, at[0], at[1], hold), state, size, inputs)
-        both = jax.vmap(jax.jacfwd(slope, argnums=(0, 1)), (0, None, 0, 0, None))
-        return both(states, nothing, *inputs, hold)
+        slopes = jax.vmap(jax.jacfwd(slope, argnums=(0, 1)), (0, None, 0, 0, None))
+        return slopes(states, nothing, *inputs, hold)
 
     def initial(perturbation: Array) -> Array:
         at = perturbed(rows[0], jax.tree.map(lambda x: x[0], grid.node.environment), perturbation)
@@ -279,11 +279,8 @@ def linearise(
         return read(system.sample(state, perturbed(row, tables.environment, perturbation), hold, points, tables, loads))
 
     rows = grid.node.known + grid.node.unknown @ loads
-    nodes = (rows, grid.node.environment)
-    first, middle, last = (
-        jax.tree.map(lambda x, s=s: x[s], nodes) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
-    )
-    by_state, by_input = jax.vmap(stages)(trajectory.left, grid.step, grid.zero_order_hold, first, middle, last)
+    nodes = split_nodes((rows, grid.node.environment))
+    by_state, by_input = jax.vmap(stages)(trajectory.left, grid.step, grid.zero_order_hold, *nodes)
     at = (
         trajectory.at(grid.step_of, grid.fraction),
         grid.sample.known + grid.sample.unknown @ loads,
@@ -320,9 +317,6 @@ def _integrate(
     loads = jnp.concatenate([inertial, *(effect.body_loads(v, inertial) for effect, v in pairs)])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
     nodes = (bodies, grid.node.environment)
-    first, middle, last = (
-        jax.tree.map(lambda x, s=s: x[s], nodes) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
-    )
     initial = system.initial(jax.tree.map(lambda x: x[0], nodes), start, _spin_error(grid.unit_speed, loads, start))
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
@@ -331,9 +325,8 @@ def _integrate(
         # the last slope differs from the next step's first one where the held wrench jumps
         return new, (state, size * first, size * last)
 
-    final, (states, slopes, end_slopes) = jax.lax.scan(
-        step, initial, (grid.step, grid.zero_order_hold, first, middle, last)
-    )
+    steps = (grid.step, grid.zero_order_hold, *split_nodes(nodes))
+    final, (states, slopes, end_slopes) = jax.lax.scan(step, initial, steps)
     return system, loads, _StateTrajectory(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
 
 
@@ -347,10 +340,10 @@ def _spin_error(tables: UnitSpeed, loads: Array, start: Start) -> Array:
 
 def _sample(grid: Grid, points: Array, system: System, loads: Array, trajectory: _StateTrajectory) -> Samples:
     """Return the motion at the samples along a trajectory of states."""
-    seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
+    bodies = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
     sample = jax.vmap(system.sample, (0, 0, 0, None, 0, None))
     states, hold = trajectory.at(grid.step_of, grid.fraction), grid.zero_order_hold[grid.step_of]
-    return sample(states, (seen, grid.sample.environment), hold, points, grid.sample, loads)
+    return sample(states, (bodies, grid.sample.environment), hold, points, grid.sample, loads)
 
 
 class _Inner(NamedTuple):
@@ -519,20 +512,20 @@ class System(NamedTuple):
         momentum, rate = instant.environment.wheel_momentum, instant.environment.wheel_torque
         for effect, values, states, _, speed in self._inner(inner):
             if effect.uses("momentum"):
-                more, more_rate = effect.momentum(values, instant, states)
-                momentum, rate = momentum + more, rate + more_rate
+                added, added_rate = effect.momentum(values, instant, states)
+                momentum, rate = momentum + added, rate + added_rate
             if effect.modes_count:
                 momentum = momentum + _about_com(effect.modes(values), instant.body.com).T @ speed
         return momentum, rate
 
     def _wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
         """Return the force and its torque about the base origin."""
-        given = hold + instant.environment.wrench
-        total = Wrench(given[:3], given[3:])
+        known = hold + instant.environment.wrench
+        total = Wrench(known[:3], known[3:])
         for effect, values, states, *_ in self._inner(inner):
             if effect.uses("wrench"):
-                more = effect.wrench(values, instant, states)
-                total = Wrench(total.force + more.force, total.torque + more.torque)
+                added = effect.wrench(values, instant, states)
+                total = Wrench(total.force + added.force, total.torque + added.torque)
         return total
 
     def _gravity_gradient_tensor(self, instant: Instant) -> Array:

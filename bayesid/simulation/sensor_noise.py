@@ -47,8 +47,8 @@ class White:
 
     def sigma(self, interval: float) -> Floats:
         """Return the given values, which do not depend on the interval; one number stands for three axes."""
-        given = np.asarray(self.value, dtype=float)
-        return given.copy() if given.ndim else np.full(3, given)
+        value = np.asarray(self.value, dtype=float)
+        return value.copy() if value.ndim else np.full(3, value)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._math.resampling import hermite
-from bayesid._math.runge_kutta import runge_kutta_step
+from bayesid._math.runge_kutta import runge_kutta_step, split_nodes
 from bayesid.simulation.dynamics import Samples, Start, System, TimeTables, composite
 from bayesid.simulation.effects.effect import Effect
 
@@ -220,9 +220,6 @@ class Equations:
     ) -> Array:
         bodies = jax.vmap(composite)(rows)
         nodes = (bodies, jax.tree.map(jnp.asarray, tables.environment))
-        parts = [
-            jax.tree.map(lambda x, s=s: x[s], nodes) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
-        ]
         system = self._system(values)
 
         def derivative(state: Array, given: tuple) -> Array:
@@ -234,7 +231,7 @@ class Equations:
             middle = hermite(state, new, size * first, size * last, 0.5)
             return new, (state, middle)
 
-        final, (left, middle) = jax.lax.scan(advance, initial, (step, *parts))
+        final, (left, middle) = jax.lax.scan(advance, initial, (step, *split_nodes(nodes)))
         return _alternating(left, middle, final)
 
 
@@ -262,10 +259,7 @@ def propagate(by_state: Array, forcing: Array, initial: Array, step: Array) -> A
         new = state + size / 6.0 * (a + 2.0 * (b + c) + d)
         return new, (state, hermite(state, new, size * a, size * (last @ new + there), 0.5))
 
-    coefficients, forcings = (
-        tuple(part[s] for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))) for part in (by_state, forcing)
-    )
-    final, (left, middle) = jax.lax.scan(advance, initial, (step, coefficients, forcings))
+    final, (left, middle) = jax.lax.scan(advance, initial, (step, split_nodes(by_state), split_nodes(forcing)))
     return _alternating(left, middle, final)
 
 

@@ -454,9 +454,8 @@ def bounds_by_label(
     InputError
         If a stated bound belongs to no effect, or to none of the effect's units.
     """
-    given = {} if stated is None else stated
     bounds = {effect.label: {bound.unit: bound for bound in effect.physical_bounds(model)} for effect in effects}
-    for label, better in given.items():
+    for label, better in ({} if stated is None else stated).items():
         if label not in bounds:
             raise InputError(
                 f"a bound is stated for {label!r}, which does not occur", remedy=f"Choose from {', '.join(bounds)}"

@@ -167,9 +167,9 @@ class MassShift(Effect):
 
 def _seconds(instants: str | Sequence[float]) -> tuple[float, ...]:
     """Return instants from numbers or from text with commas between them."""
-    given = [part for part in instants.split(",") if part] if isinstance(instants, str) else instants
+    parts = [part for part in instants.split(",") if part] if isinstance(instants, str) else instants
     try:
-        seconds = tuple(float(instant) for instant in given)
+        seconds = tuple(float(instant) for instant in parts)
     except ValueError:
         seconds = (float("nan"),)
     if any(np.isnan(instant) for instant in seconds):

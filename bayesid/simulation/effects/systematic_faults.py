@@ -137,8 +137,8 @@ class _FaultByAxis(_FaultOfAnyKind):
 
     def __init__(self, sigma: float | tuple[float, ...] | None = None) -> None:
         axes = self.sensor.axes[: self.sensor.size]
-        given = self.typical() if sigma is None else sigma
-        values = (given,) * len(axes) if isinstance(given, int | float) else given
+        widths = self.typical() if sigma is None else sigma
+        values = (widths,) * len(axes) if isinstance(widths, int | float) else widths
         unit = self.unit()
         self.parameters = tuple(Parameter(axis, unit, float(value)) for axis, value in zip(axes, values, strict=True))
 
