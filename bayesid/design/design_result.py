@@ -25,7 +25,7 @@ from bayesid.design.trajectory_search import Search, SearchResult, Store, optimi
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
-__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
+__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "risks", "sample_times"]
 
 CERTAIN = 0.99  # probability with which a limit must hold for a manoeuvre to be flown
 PASSES = 4  # largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them

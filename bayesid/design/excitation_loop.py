@@ -46,7 +46,7 @@ from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
 
-__all__ = ["Loop", "NotFlown"]
+__all__ = ["Loop", "NotFlown", "flown"]
 
 # factor on a star sensor's noise for an initial attitude from its first sample, as the fit uses that sample again
 LOOSE = 10.0

@@ -19,7 +19,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Channels, Sensor, SensorKind
 
-__all__ = ["Manoeuvre", "Model"]
+__all__ = ["Manoeuvre", "Model", "spread_links"]
 
 RATE_SIGMA = 0.1
 """Default prior standard deviation of an unknown initial rate [rad/s], wide for any spacecraft."""
