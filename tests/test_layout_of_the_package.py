@@ -22,20 +22,12 @@ REFUSED = {
 
 # vague identifiers with the number of places that may still bind each, by part of the package: none may grow
 VAGUE: dict[str, dict[str, int]] = {
-    "held": {"diagnosis": 5, "identifiability": 1, "inference": 1},
-    "own": {"_math": 1, "design": 2, "diagnosis": 48, "inference": 7, "report": 2, "simulation": 7},
-    "found": {"_math": 3, "design": 12, "diagnosis": 53, "inference": 9, "report": 8, "simulation": 1},
-    "item": {
-        "_math": 1,
-        "design": 13,
-        "diagnosis": 75,
-        "identifiability": 10,
-        "inference": 23,
-        "report": 56,
-        "simulation": 6,
-    },
-    "wanted": {"app": 1, "diagnosis": 1, "identifiability": 1, "inference": 2, "report": 1, "simulation": 1},
-    "push": {"diagnosis": 7, "simulation": 4},
+    "held": {"diagnosis": 5, "inference": 1},
+    "own": {"diagnosis": 48, "inference": 7, "report": 2},
+    "found": {"diagnosis": 53, "inference": 9, "report": 8},
+    "item": {"diagnosis": 75, "inference": 23, "report": 56},
+    "wanted": {"app": 1, "diagnosis": 1, "inference": 2, "report": 1},
+    "push": {"diagnosis": 7},
     "tone": {"diagnosis": 10},
 }
 
