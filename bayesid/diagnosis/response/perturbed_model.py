@@ -77,7 +77,7 @@ class Fit:
     added : tuple of (N, m) arrays
         And in each effect's coordinates.
     cost : float
-        Half of chi-square and squared coordinates.
+        Half of chi-square and squared coordinates; infinite where residual or derivatives are not finite.
     operating : OperatingTrajectory
     converged : bool
     released : (k,) array of int
@@ -132,7 +132,9 @@ class Fit:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Laplace approximation of the log evidence under the priors of the unknowns and of the effects fitted."""
+        """Laplace approximation of the log evidence under all priors; minus infinity where nothing could be fitted."""
+        if not np.isfinite(self.cost):
+            return -np.inf
         return -self.cost - self.block.half_log_det + float(self.posterior.log_normalisation.sum())
 
     def project(self, columns: Floats) -> Floats:
@@ -258,7 +260,7 @@ class PerturbedModel:
         best: _Point | None = None
         for _ in range(iterations):
             here = self._point(effects, chosen, z, operating)
-            if not np.isfinite(here.jacobian).all() or not np.isfinite(here.cost):
+            if not np.isfinite(here.cost):
                 break
             if best is None or here.cost < best.cost:
                 best = here
@@ -290,7 +292,7 @@ class PerturbedModel:
                 break
             cost = there
         last = self._point(effects, chosen, z, operating)
-        if best is None or (np.isfinite(last.jacobian).all() and last.cost < best.cost + CLOSE):
+        if best is None or last.cost < best.cost + CLOSE:
             best = last  # unless motion and pushes came apart on the way
         counts = np.cumsum([len(self.free), *sizes])[:-1]
         own, *added = np.split(best.jacobian, counts, axis=1)
@@ -317,9 +319,13 @@ class PerturbedModel:
         data = self._pushed(self.pushes(effects, coordinates, operating))
         residual = self.residual(z, data)
         sized = [(effect, c) for effect, c in zip(effects, coordinates, strict=True) if len(c)]
-        columns = [self.own_columns(z, data), *self.columns(sized, operating, z, data)]
-        cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
-        return _Point(z, data, list(coordinates), operating, residual, np.concatenate(columns, axis=1), cost)
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable motion, whose cost says so
+            columns = [self.own_columns(z, data), *self.columns(sized, operating, z, data)]
+            jacobian = np.concatenate(columns, axis=1)
+            cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
+        if not (np.isfinite(cost) and np.isfinite(jacobian).all()):
+            cost = np.inf
+        return _Point(z, data, list(coordinates), operating, residual, jacobian, cost)
 
     def _cost(
         self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory

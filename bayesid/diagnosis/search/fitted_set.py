@@ -191,7 +191,7 @@ def fit_hypothesis(
     Raises
     ------
     InputError
-        If no start of the fit has a motion.
+        If no start of the fit has a motion with finite derivatives.
     """
     faulty = {fault.label for fault in faults}
     names = [name for name in causes if name not in faulty]
@@ -209,7 +209,7 @@ def fit_hypothesis(
         except InputError as error:  # no motion from this start
             problem = error
             continue
-        if best is None or fit.cost < best.cost:
+        if np.isfinite(fit.cost) and (best is None or fit.cost < best.cost):
             best = fit
     if best is None:
         raise problem
