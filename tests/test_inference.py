@@ -14,7 +14,7 @@ from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import kstest, norm
 
 from bayesid._io.errors import InputError
-from bayesid.inference import integration_step
+from bayesid.inference import identification, integration_step
 from bayesid.inference.ensemble import BLOCK, LaplaceMove, autocorrelation_time, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
@@ -200,6 +200,25 @@ def test_a_run_that_does_not_converge_says_so():
     chains = drawn(LinearGaussian())
     assert chains.steps == 150
     assert not chains.converged
+
+
+def test_walkers_that_accept_no_proposal_are_given_up_early():
+    """The proposal is a hundred times as wide as the posterior, and said to be trusted: the sampler ends by itself."""
+    stub = LinearGaussian(6)
+    wide = StudentT.about(stub.optimum.z, 1e4 * stub.optimum.covariance)
+    chains = drawn(stub, trusted=True, proposal=wide, max_steps=3000)
+    assert chains.stuck
+    assert not chains.converged
+    assert chains.steps < 300
+    assert not drawn(stub, trusted=True, max_steps=250).stuck
+
+
+def test_data_that_no_unknowns_follow_are_refused(planar_posterior, monkeypatch):
+    posterior = planar_posterior(np.random.default_rng(0), step=0.5)
+    far = Optimum(posterior.starting_point(), np.eye(posterior.size), 1e9 * posterior.samples, 0.0, 1, False)
+    monkeypatch.setattr(identification, "maximise", lambda posterior, rng, start=None: (posterior, far))
+    with pytest.raises(InputError, match=r"chi-square per sample is 1e\+09.*bayesid diagnose"):
+        identify(posterior)
 
 
 def interrupt_between_blocks(stub, file):

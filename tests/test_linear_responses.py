@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.perturbed_posterior import LinearResponses, Perturbation, perturbed, residual_of
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import (
@@ -82,3 +84,21 @@ def test_each_part_of_a_push_alone_adds_up(planar_posterior: Callable[..., Poste
     np.testing.assert_allclose(np.sum(parts, axis=0), whole, atol=1e-12 * np.abs(whole).max())
     assert all(np.abs(part).max() > 0.0 for part in parts)
     assert linear.along(jax.tree.map(lambda x: x[:0], pushes)).shape == (0, *posterior.residual_shape)
+
+
+def test_a_fit_without_finite_derivatives_has_no_evidence(monkeypatch):
+    """Its motion is unstable: it costs more than any other fit, and no hypothesis is chosen for it."""
+    stub = SimpleNamespace(log_normalisation=np.zeros(1), size=2, data=SimpleNamespace(arrays=None))
+    model, residual, columns = PerturbedModel(stub), np.zeros(5), np.ones((5, 2))
+    monkeypatch.setattr(model, "residual", lambda z, data: residual)
+    monkeypatch.setattr(model, "own_columns", lambda z, data: columns)
+    evidences = []
+    for cost in (0.0, np.inf):
+        point = model._point([], [], np.zeros(2), None)
+        assert point.cost == cost
+        nothing = np.zeros(0, dtype=int)
+        fit = Fit(stub, (), (), point.z, None, residual, columns, (), point.cost, None, True, nothing, nothing)
+        evidences.append(fit.log_evidence)
+        columns[2, 1] = np.nan
+    assert np.isfinite(evidences[0])
+    assert evidences[1] == -np.inf

@@ -225,6 +225,8 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
     if not result.bodies:
         return []
     sentences = []
+    if all(item.verdict is not ContractionVerdict.CONTRACTED for item in result.contraction.values()):
+        sentences.append(f"These recordings do not determine {abridged(list(result.bodies))}.")
     for verdict, text in (
         (ContractionVerdict.NOT, "is the prior"),
         (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),

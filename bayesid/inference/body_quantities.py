@@ -99,19 +99,40 @@ class Linearised(NamedTuple):
 
 
 def linearise(posterior: Posterior, z: Floats) -> Linearised:
-    """Linearise the reported quantities of the identified bodies at the coordinates ``z`` (size,)."""
+    """Linearise the reported quantities of the identified bodies at the coordinates ``z`` (size,).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
     unknowns = posterior.unknowns
     return Linearised(names, quantities_at(unknowns, z), quantity_slopes_at(unknowns, z))
 
 
 def quantities_at(unknowns: Unknowns, z: Floats) -> Floats:
-    """Return the reported quantities of all identified bodies (n,) at coordinates (size,)."""
+    """Return the reported quantities of all identified bodies (n,) at coordinates (size,).
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    z : (size,) array
+        Coordinates.
+    """
     return np.asarray(_quantities(unknowns.layout, unknowns.numbers, _identified(unknowns), on_device(z)))
 
 
 def quantity_slopes_at(unknowns: Unknowns, z: Floats) -> Floats:
-    """Return their derivatives by the coordinates, shape (n, size)."""
+    """Return their derivatives by the coordinates, shape (n, size).
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    z : (size,) array
+        Coordinates.
+    """
     return np.asarray(_quantity_slopes(unknowns.layout, unknowns.numbers, _identified(unknowns), on_device(z)))
 
 
@@ -131,7 +152,14 @@ def _quantity_slopes(layout: Layout, numbers: PriorNumbers, identified: Traceabl
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
-    """Return the reported quantities of the identified bodies at coordinates of many draws, shape (draws, size)."""
+    """Return the reported quantities of the identified bodies at coordinates of many draws, shape (draws, size).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (draws, size) array
+        Coordinates.
+    """
     inertial = np.asarray(posterior.unknowns.values_of(z).inertial).reshape(len(z), -1, 10)
     return {
         prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
@@ -141,13 +169,27 @@ def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
 
 
 def reported_effect(effect: Effect, values: Floats) -> Floats:
-    """Return the reported quantities of an effect (..., m) from values of its parameters (..., n)."""
+    """Return the reported quantities of an effect (..., m) from values of its parameters (..., n).
+
+    Parameters
+    ----------
+    effect : Effect
+    values : (..., n) array
+        Values of its parameters, in their units.
+    """
     flat = on_device(values.reshape(-1, values.shape[-1]))
     return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
 
 
 def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
-    """Return a quantity in the form that all quantities have in JSON."""
+    """Return a quantity in the form that all quantities have in JSON.
+
+    Parameters
+    ----------
+    mean, sd : float
+        In the unit.
+    unit : str
+    """
     return {"mean": float(mean), "sd": float(sd), "unit": unit}
 
 
@@ -211,6 +253,13 @@ def compare(names: Sequence[str], prior: Floats, posterior: Floats) -> dict[str,
 
     A width is half the range of the central 68 %, which for a normal distribution is the standard deviation and is
     finite for every distribution.
+
+    Parameters
+    ----------
+    names : (n,) sequence of str
+        Names of the quantities.
+    prior, posterior : (draws, n) arrays
+        Draws, in the units of the quantities.
     """
     before, after = half_range(prior), half_range(posterior)
     return {

@@ -4,7 +4,8 @@ In coordinates linear in the inertial parameters (`LinearParameterisation`) the 
 the prior, which keeps bodies physical, is far from it. The likelihood linearised at the mode is therefore combined with
 the exact prior of the widely known bodies; everything else is normal given them and is integrated out. What is left
 depends on ten or twenty coordinates and needs no simulation: emcee draws from it in seconds. Its draws, completed by
-the normal part, are proposals of which nearly all are accepted.
+the normal part, are proposals of which nearly all are accepted (Liu 1994, The collapsed Gibbs sampler in Bayesian
+computations, Journal of the American Statistical Association 89).
 """
 
 from __future__ import annotations
@@ -84,7 +85,14 @@ class CollapsedProposal:
         return np.setdiff1d(np.arange(len(self.mode)), self.wide)
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
-        """Draw points y from the distribution, shape (count, n)."""
+        """Draw points y from the distribution, shape (count, n).
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        rng : numpy.random.Generator
+        """
         z = self._with(self.pool[(rng.uniform(size=count) * len(self.pool)).astype(int)])
         y = self.unknowns.to_linear(z)
         away = y[:, self.wide] - self._centre[self.wide]
@@ -119,7 +127,13 @@ class CollapsedProposal:
 
 
 def wide_coordinates(unknowns: Unknowns, optimum: Optimum) -> Integers:
-    """Return the indices of the coordinates of all bodies, effects on links included, that are known widely."""
+    """Return the indices of the coordinates of all bodies, effects on links included, that are known widely.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    optimum : Optimum
+    """
     layout = unknowns.layout
     # bodies that the prior correlates have linear coordinates all together
     bodies = [layout.body(index) for index in range(layout.bodies)] if unknowns.mixing is None else [layout.all_bodies]
@@ -142,7 +156,7 @@ def collapsed_proposal(
     rng : numpy.random.Generator
         Source of all random numbers.
     effective_samples : float
-        Number of independent draws of the widely known bodies that are wanted; twice as many are made.
+        Number of independent draws of the widely known bodies to make; twice as many are made.
     """
     unknowns = posterior.unknowns
     wide = wide_coordinates(unknowns, optimum)
@@ -175,10 +189,10 @@ def _linearised(posterior: Posterior, optimum: Optimum, wide: Integers) -> Colla
     slopes = posterior.jacobian(z)[: len(residual)] @ inverse
     other = np.setdiff1d(np.arange(len(z)), wide)
     gradient, hessian = slopes.T @ residual, slopes.T @ slopes
-    own = inverse[np.ix_(other, other)]  # z of the other coordinates by their y
+    slope = inverse[np.ix_(other, other)]  # z of the other coordinates by their y
     mixed = hessian[np.ix_(other, wide)]
-    factor = np.linalg.cholesky(hessian[np.ix_(other, other)] + own.T @ own)
-    pull = solve_triangular(factor, gradient[other] + own.T @ z[other], lower=True)
+    factor = np.linalg.cholesky(hessian[np.ix_(other, other)] + slope.T @ slope)
+    pull = solve_triangular(factor, gradient[other] + slope.T @ z[other], lower=True)
     drag = solve_triangular(factor, mixed, lower=True)
     return CollapsedProposal(
         unknowns,

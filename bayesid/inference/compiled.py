@@ -125,7 +125,14 @@ class Traced(NamedTuple):
 
 
 def perturbed(arrays: Arrays, perturbation: Perturbation) -> Arrays:
-    """Return the arrays with a perturbation added to the known tables, wrenches and readings."""
+    """Return the arrays with a perturbation added to the known tables, wrenches and readings.
+
+    Parameters
+    ----------
+    arrays : Arrays
+        Data.
+    perturbation : Perturbation
+    """
 
     def sum_of(one: Traceable, other: Floats) -> Array:
         return on_device(np.asarray(one) + other)  # JAX would compile the addition for each shape
@@ -158,35 +165,97 @@ class Simulated(NamedTuple):
 
 @kept_jit(static=1)
 def simulated(structure: Structure, numbers: Numbers, z: Array, grid: Grid, attitude: Array) -> Simulated:
-    """Simulate all recordings at the coordinates ``z`` (size,)."""
+    """Simulate all recordings at the coordinates ``z`` (size,).
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    grid : Grid
+        Integration nodes and samples, leading axis R.
+    attitude : (R, 4) array
+        Attitudes at time 0, quaternions x, y, z, w.
+    """
     values = structure.layout.values(numbers.prior, z)
     return Simulated(*structure.simulator.readings(numbers.model, values, grid, attitude))
 
 
 def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the whitened residual of all recordings, shape (R, O, C)."""
+    """Return the whitened residual of all recordings, shape (R, O, C).
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return _whitened(arrays.weights, arrays.start, _deviations(structure, numbers, z, _bare(arrays))[None])[0]
 
 
 def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the derivative of the whitened residual by forward-mode differentiation, shape (size, R, O, C)."""
+    """Return the derivative of the whitened residual by forward-mode differentiation, shape (size, R, O, C).
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return _whitened(arrays.weights, arrays.start, _slopes(structure, numbers, z, _bare(arrays)))
 
 
 @kept_jit(static=1)
 def chi2(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the chi-square of every recording at many points, shape (n, size) -> (n, R)."""
+    """Return the chi-square of every recording at many points, shape (n, size) -> (n, R).
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (n, size) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return jax.vmap(lambda z: jnp.sum(residuals(structure, numbers, z, arrays) ** 2, axis=(1, 2)))(z)
 
 
 def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Traced:
-    """Simulate all recordings and return the motion of the robot with the readings and the residual."""
+    """Simulate all recordings and return the motion of the robot with the readings and the residual.
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     node, sample, read, deviation = _traced(structure, numbers, z, _bare(arrays))
     return Traced(node, sample, read, _whitened(arrays.weights, arrays.start, deviation[None])[0])
 
 
 def linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
-    """Linearise the simulation of all recordings in what may act from outside the model, leading axis R."""
+    """Linearise the simulation of all recordings in what may act from outside the model, leading axis R.
+
+    Parameters
+    ----------
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return _linearised(structure, numbers, z, _bare(arrays))
 
 

@@ -64,7 +64,7 @@ class Data:
     @property
     def samples(self) -> int:
         """Number of scalar samples that the likelihood uses."""
-        return sum(item.samples for item in self.whitenings)
+        return sum(of_recording.samples for of_recording in self.whitenings)
 
     @property
     def residual_shape(self) -> tuple[int, int, int]:
@@ -76,7 +76,14 @@ class Data:
         return self.recorded[index].time
 
     def measured(self, index: int, kind: SensorKind) -> Series:
-        """Return the recorded times and values of one sensor in one recording."""
+        """Return the recorded times and values of one sensor in one recording.
+
+        Parameters
+        ----------
+        index : int
+            Number of the recording.
+        kind : SensorKind
+        """
         return self.recorded[index].series[kind]
 
     def torques(self, index: int) -> Series:
@@ -84,7 +91,14 @@ class Data:
         return self.recorded[index].torque
 
     def sigma(self, index: int, kind: SensorKind) -> Floats:
-        """Return the standard deviations of the white noise of one sensor in one recording, shape (size,)."""
+        """Return the standard deviations of the white noise of one sensor in one recording, shape (size,).
+
+        Parameters
+        ----------
+        index : int
+            Number of the recording.
+        kind : SensorKind
+        """
         return self.recorded[index].sigma(kind)
 
     def left_out_times(self, index: int) -> dict[SensorKind, Floats]:
@@ -101,7 +115,16 @@ class Data:
 def grids_of(
     model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[RecordedSamples], step: float
 ) -> list[Grid]:
-    """Return the grid of integration nodes and samples of every recording, for an integration step [s]."""
+    """Return the grid of integration nodes and samples of every recording, for an integration step [s].
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    recorded : (R,) sequence of RecordedSamples
+    step : float
+        Integration step [s].
+    """
     grids = []
     for index, (manoeuvre, samples) in enumerate(zip(manoeuvres, recorded, strict=True)):
         effects = [effect.in_recording(index) for effect in model.effects]
@@ -136,18 +159,27 @@ def stacked(
     grids: Sequence[Grid],
     whitenings: Sequence[Whitening],
 ) -> Arrays:
-    """Stack all recordings, padded coarsely so that recordings of about the same length share compiled code."""
+    """Stack all recordings, padded coarsely so that recordings of about the same length share compiled code.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    recorded : (R,) sequence of RecordedSamples
+    grids : (R,) sequence of Grid
+    whitenings : (R,) sequence of Whitening
+    """
     steps, samples = max(len(grid.step) for grid in grids), max(len(grid.step_of) for grid in grids)
     grid = pad_grids(grids, rounded(steps), rounded(samples))
     count = grid.step_of.shape[1]
 
     def padded(values: Sequence[Floats]) -> jnp.ndarray:
-        return on_device(np.stack([lengthened(item, count) for item in values]))
+        return on_device(np.stack([lengthened(series, count) for series in values]))
 
     measured = Readings(
-        padded([item.time for item in recorded]),
-        {kind.value: padded([item.gridded(kind) for item in recorded]) for kind in model.channels.kinds},
-        padded([item.gridded_torque for item in recorded]),
+        padded([recording.time for recording in recorded]),
+        {kind.value: padded([recording.gridded(kind) for recording in recorded]) for kind in model.channels.kinds},
+        padded([recording.gridded_torque for recording in recorded]),
     )
     offset = on_device(np.zeros((len(recorded), count, model.channels.count)))
     none = on_device(np.zeros(0))
@@ -155,15 +187,21 @@ def stacked(
 
 
 def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
-    """Return the arrays with another whitening."""
-    outputs = rounded(max(len(item.start) for item in whitenings))
-    width = max(item.weights.shape[2] for item in whitenings)
+    """Return the arrays with another whitening.
+
+    Parameters
+    ----------
+    arrays : Arrays
+    whitenings : (R,) sequence of Whitening
+    """
+    outputs = rounded(max(len(of_recording.start) for of_recording in whitenings))
+    width = max(of_recording.weights.shape[2] for of_recording in whitenings)
     channels = whitenings[0].weights.shape[1]
     weights = np.zeros((len(whitenings), outputs, channels, width, channels))
     start = np.zeros((len(whitenings), outputs), dtype=np.int32)
-    for row, item in enumerate(whitenings):
-        weights[row, : len(item.start), :, : item.weights.shape[2]] = item.weights
-        start[row, : len(item.start)] = item.start
+    for row, of_recording in enumerate(whitenings):
+        weights[row, : len(of_recording.start), :, : of_recording.weights.shape[2]] = of_recording.weights
+        start[row, : len(of_recording.start)] = of_recording.start
     return arrays._replace(weights=on_device(weights), start=on_device(start))
 
 
@@ -207,6 +245,11 @@ class RecordedSamples:
     def of(cls, model: Model, manoeuvre: Manoeuvre) -> RecordedSamples:
         """Return the samples of the sensors of a model in one recording.
 
+        Parameters
+        ----------
+        model : Model
+        manoeuvre : Manoeuvre
+
         Raises
         ------
         InputError
@@ -225,7 +268,13 @@ class RecordedSamples:
         return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used)
 
     def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> RecordedSamples:
-        """Return the same samples with other noise of the sensors."""
+        """Return the same samples with other noise of the sensors.
+
+        Parameters
+        ----------
+        sensors : sequence of Sensor
+        torque : TorqueSensor or None
+        """
         return replace(self, sensors=tuple(sensors), torque_sensor=torque)
 
     def rows(self, kind: SensorKind) -> Integers:
@@ -287,7 +336,14 @@ class RecordedSamples:
 
 
 def first_rate(sensor: Sensor, values: Floats) -> Floats:
-    """Return the mean of the first three samples (n, 3) of a rate sensor, base axes, as the rate at the start."""
+    """Return the mean of the first three samples (n, 3) of a rate sensor, base axes, as the rate at the start.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    values : (n, 3) array
+        Its readings [rad/s].
+    """
     return np.asarray(sensor.rotation @ values[:3].mean(axis=0))
 
 

@@ -1,7 +1,9 @@
 """Posterior samples by emcee: independent ensembles that start from the Laplace approximation and run to convergence.
 
 Two kinds of move are mixed at random: an independence move that proposes from an approximation about the mode, which
-mixes in a few steps where the posterior is nearly that, and emcee's differential evolution, which needs none.
+mixes in a few steps where the posterior is nearly that, and emcee's differential evolution, which needs none
+(Foreman-Mackey, Hogg, Lang & Goodman 2013, emcee: the MCMC hammer, PASP 125; ter Braak & Vrugt 2008, Differential
+evolution Markov chain with snooker updater and fewer chains, Statistics and Computing 18).
 """
 
 from __future__ import annotations
@@ -55,6 +57,9 @@ beside `BURN_IN` and `WINDOW`.
 INDEPENDENT = {True: 0.95, False: 0.5}
 """Share of moves that propose from the approximation about the mode, where it is and is not trusted."""
 
+STUCK_AFTER, STUCK = 200, 0.02
+"""Number of steps from which on a sampler is given up that trusts its proposals, and the share of accepted ones."""
+
 KEPT = "positions, log densities, log likelihoods"
 """What the store holds of every step."""
 
@@ -69,7 +74,14 @@ class Proposal(Protocol):
     """Distribution of which independence moves propose, over the coordinates in which the walkers move."""
 
     def draw(self, count: int, rng: np.random.RandomState) -> Floats:
-        """Draw points, shape (count, n)."""
+        """Draw points, shape (count, n).
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        rng : numpy.random.RandomState
+        """
         ...
 
     def log_density(self, y: Floats) -> Floats:
@@ -137,6 +149,11 @@ class Chains:
     walkers: int
     converged: bool
 
+    @property
+    def stuck(self) -> bool:
+        """Whether hardly any proposal was accepted, so that the walkers have not left where they started."""
+        return self.acceptance < STUCK and self.autocorrelation >= self.steps >= STUCK_AFTER
+
     @cached_property
     def z(self) -> Floats:
         """Draws in the posterior's coordinates, shape (ensembles, draws, n)."""
@@ -173,7 +190,8 @@ def sample(
     effective_samples : float
         Goal for the effective samples of all ensembles together.
     max_steps : int
-        Largest number of steps of each ensemble; a sampler that stops there may not have converged.
+        Largest number of steps of each ensemble; a sampler that stops there may not have converged. One that trusts its
+        proposal stops before where hardly any is accepted.
     trusted : bool
         Whether importance sampling trusts the proposal, so that most moves may propose from it.
     proposal : Proposal, optional
@@ -208,7 +226,8 @@ def sample(
         if steps and (steps in _tests(steps) or steps >= max_steps):
             chains = _summary(parameterisation, [sampler for sampler, _ in samplers], effective_samples)
             _tell(progress, chains, max_steps, effective_samples)
-            if chains.converged or steps >= max_steps:
+            # with hardly a move of differential evolution, walkers that accept no proposal stay where they are
+            if chains.converged or steps >= max_steps or (trusted and chains.stuck):
                 return chains
         # after an interruption ensembles stand at different steps; all go on to the end of the block
         target = min(_tests(steps)[-1], max_steps)
@@ -220,15 +239,15 @@ def sample(
 
 def _tests(steps: int) -> list[int]:
     """Return the steps after which convergence is tested, up to the first beyond some steps."""
-    found = [BLOCK]
-    while found[-1] <= steps:
-        found.append(found[-1] + BLOCK * max(1, round(LONGER * found[-1] / BLOCK)))
-    return found
+    tests = [BLOCK]
+    while tests[-1] <= steps:
+        tests.append(tests[-1] + BLOCK * max(1, round(LONGER * tests[-1] / BLOCK)))
+    return tests
 
 
-def _tell(progress: Progress, chains: Chains, limit: int, wanted: float) -> None:
-    """Report the progress towards the wanted samples or, while the ensembles disagree, towards the last step."""
-    sampled = chains.effective_samples / wanted if chains.r_hat < NEARLY else 0.0
+def _tell(progress: Progress, chains: Chains, limit: int, goal: float) -> None:
+    """Report the progress towards the goal for the samples or, while the ensembles disagree, towards the last step."""
+    sampled = chains.effective_samples / goal if chains.r_hat < NEARLY else 0.0
     text = f"step {chains.steps}, {chains.effective_samples:.0f} effective samples, R-hat {chains.r_hat:.3f}"
     progress(min(max(sampled, chains.steps / limit), 1.0), text)
 
@@ -308,7 +327,7 @@ def _likelihoods(sampler: emcee.EnsembleSampler) -> Floats:
     return kept.reshape(*kept.shape[:2], -1)  # emcee leaves out the axis of a single recording
 
 
-def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
+def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], goal: float) -> Chains:
     import arviz as az  # imported here, since it takes a second that commands without samples save
 
     steps = min(int(sampler.iteration) for sampler in samplers)
@@ -332,5 +351,5 @@ def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSa
         evaluations=steps * walkers * len(samplers),
         steps=steps,
         walkers=walkers,
-        converged=bool(steps >= LENGTHS * tau and r_hat < R_HAT and effective >= wanted),
+        converged=bool(steps >= LENGTHS * tau and r_hat < R_HAT and effective >= goal),
     )

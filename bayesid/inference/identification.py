@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.errors import InputError
 from bayesid._io.files import write_json
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
@@ -42,6 +43,9 @@ NEARLY_NORMAL = 0.3
 
 PRIOR_DRAWS = 4000
 """Number of draws from the prior that give its widths, for the comparison with the posterior."""
+
+HOPELESS = 1e6
+"""Chi-square per sample from which on a posterior says nothing: the readings are a thousand sigma off."""
 
 MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
 """Largest unreported difference of two methods: of means in standard deviations, and of widths as a ratio."""
@@ -275,6 +279,12 @@ class Identification:
             sentences.append(
                 f"The sampler has not converged: R-hat {self.chains.r_hat:.3f}, "
                 f"{self.chains.effective_samples:.0f} effective samples after {self.chains.steps} steps."
+                + (
+                    " Hardly a proposal was accepted: these recordings do not determine the unknowns one by one, only "
+                    "combinations of them far from linear. Record joints that move."
+                    if self.chains.stuck
+                    else ""
+                )
             )
         return tuple(sentences)
 
@@ -283,7 +293,7 @@ class Identification:
         return {
             "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
-            "learnt": {name: item.to_dict() for name, item in self.contraction.items()},
+            "learnt": {name: contraction.to_dict() for name, contraction in self.contraction.items()},
             "widths": {name: {"prior": both[0], "posterior": both[1]} for name, both in self.widths.items()},
             "starts": [state.to_dict() for state in self.starts],
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
@@ -362,9 +372,20 @@ def identify(
         Starting point of the search for the mode, by default the prior's centre.
     effective_samples, max_steps, file, progress
         See `bayesid.inference.sample`.
+
+    Raises
+    ------
+    InputError
+        If no value of the unknowns comes near the data.
     """
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
+    if not optimum.chi2 < HOPELESS * refined.samples:
+        raise InputError(
+            f"no value of the unknowns follows the data: chi-square per sample is {optimum.chi2 / refined.samples:.2g} "
+            "after the fit, where noise alone gives 1",
+            remedy="See what `bayesid check` and `bayesid diagnose` say of attitudes, units and missing causes",
+        )
     rng = np.random.default_rng(weights)
     parameterisation = choose_parameterisation(refined, optimum, rng)
     evidence = importance_sample(parameterisation, optimum, rng)

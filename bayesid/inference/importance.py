@@ -1,4 +1,8 @@
-"""Evidence by importance sampling from a Student-t about the mode, trusted only where Pareto k-hat allows."""
+"""Evidence by importance sampling from a Student-t about the mode, trusted only where Pareto k-hat allows.
+
+Geweke 1989, Bayesian inference in econometric models using Monte Carlo integration, Econometrica 57; Vehtari, Simpson,
+Gelman, Yao & Gabry 2024, Pareto smoothed importance sampling, Journal of Machine Learning Research 25.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,7 @@ __all__ = ["Evidence", "WeightedDraws", "choose_parameterisation", "importance_s
 
 
 TRUSTED = 0.7
-"""Pareto k-hat above which importance sampling may not be trusted (Vehtari et al., JMLR 2024)."""
+"""Pareto k-hat above which importance sampling may not be trusted."""
 
 TRIAL = 512
 """Number of draws by which the coordinates are chosen."""
@@ -84,18 +88,18 @@ def importance_sample(
         effective ones, judged by the first 512, and at most 4,000.
     """
     drawn = _enough(parameterisation, optimum, rng) if draws is None else _drawn(parameterisation, optimum, rng, draws)
-    found, draws = _weighted(parameterisation, *drawn), len(drawn[0])
-    if not np.isfinite(found.top):
+    weighted, draws = _weighted(parameterisation, *drawn), len(drawn[0])
+    if not np.isfinite(weighted.top):
         return Evidence(-np.inf, np.inf, np.inf, 0.0, draws, optimum.z, np.zeros_like(optimum.z))
-    mean = found.weights @ found.z
+    mean = weighted.weights @ weighted.z
     return Evidence(
-        value=float(found.top + np.log(found.raw.mean())),
-        error=float(found.raw.std() / found.raw.mean() / np.sqrt(draws)),
-        pareto_k=found.pareto_k,
-        effective_samples=found.effective_samples,
+        value=float(weighted.top + np.log(weighted.raw.mean())),
+        error=float(weighted.raw.std() / weighted.raw.mean() / np.sqrt(draws)),
+        pareto_k=weighted.pareto_k,
+        effective_samples=weighted.effective_samples,
         evaluations=draws,
         mean=mean,
-        sd=np.sqrt(found.weights @ (found.z - mean) ** 2),
+        sd=np.sqrt(weighted.weights @ (weighted.z - mean) ** 2),
     )
 
 
@@ -139,7 +143,16 @@ class WeightedDraws(NamedTuple):
 def weighted_draws(
     parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
 ) -> WeightedDraws:
-    """Draw from the Student-t about the mode and weight the draws by the posterior."""
+    """Draw from the Student-t about the mode and weight the draws by the posterior.
+
+    Parameters
+    ----------
+    parameterisation : Parameterisation
+    optimum : Optimum
+    rng : numpy.random.Generator
+    draws : int
+        Number of draws.
+    """
     return _weighted(parameterisation, *_drawn(parameterisation, optimum, rng, draws))
 
 
@@ -181,6 +194,12 @@ def choose_parameterisation(posterior: Posterior, optimum: Optimum, rng: np.rand
     """Return the parameterisation in which the Student-t about the mode is the better proposal.
 
     The linear one is not tried where log-Cholesky coordinates are as good as the proposal can be.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    optimum : Optimum
+    rng : numpy.random.Generator
     """
 
     def merit(parameterisation: Parameterisation) -> tuple[bool, float]:

@@ -19,7 +19,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
-__all__ = ["choose_step", "integration_error", "simulate_padded", "step_error"]
+__all__ = ["choose_step", "integration_error", "simulate_padded"]
 
 LONGEST_STEP = 2.0
 """Longest integration step, from which the search starts [s]."""
@@ -42,7 +42,18 @@ def choose_step(
     numbers: Numbers,
     z: Floats,
 ) -> float:
-    """Return the longest step [s], by halving from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE`."""
+    """Return the longest step [s], by halving from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE`.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    recorded : (R,) sequence of RecordedSamples
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    """
     shortest = min(float(samples.time[-1]) for samples in recorded)
     step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in model.effects)])
     coarsest = step
@@ -61,27 +72,27 @@ def choose_step(
             )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
-            raise step_error(model, manoeuvres)
+            raise _step_error(model, manoeuvres)
 
 
-def step_error(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
+def _step_error(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
     """Return the error where no step is short enough, with the recorded column of the fastest motion."""
     problem = "no integration step reaches 1 % of the sensors' noise"
     remedy = "Give rates in rad/s and joints in rad, and check the sensors' sigma"
-    found: list[tuple[float, str, Recording, str]] = []
+    speeds_by_column: list[tuple[float, str, Recording, str]] = []
     for manoeuvre in manoeuvres:
         recording = manoeuvre.recording
         for column in SensorKind.RATE.columns:
             if column in recording.channels:
                 rate = float(np.nanmax(np.abs(recording.channels[column])))
-                found.append((rate, SensorKind.RATE.unit, recording, column))
+                speeds_by_column.append((rate, SensorKind.RATE.unit, recording, column))
         speeds = np.abs(manoeuvre.motion.evaluate(recording.time).velocity).max(axis=0)
         for joint, speed in zip(model.robot.joints, speeds, strict=True):
             family = "position" if f"position.{joint.name}" in recording.channels else "velocity"
-            found.append((float(speed), f"{joint.unit}/s", recording, f"{family}.{joint.name}"))
-    if not found:
+            speeds_by_column.append((float(speed), f"{joint.unit}/s", recording, f"{family}.{joint.name}"))
+    if not speeds_by_column:
         return InputError(problem, remedy=remedy)
-    speed, unit, recording, column = max(found, key=lambda item: item[0])
+    speed, unit, recording, column = max(speeds_by_column, key=lambda entry: entry[0])
     return InputError(
         f"{problem}; the fastest motion recorded is {speed:.3g} {unit}",
         file=recording.file or recording.name,
@@ -99,7 +110,20 @@ def integration_error(
     z: Floats,
     step: float,
 ) -> float:
-    """Return the largest error of any sample due to the step, in its standard deviations, from half the step."""
+    """Return the largest error of any sample due to the step, in its standard deviations, from half the step.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    recorded : (R,) sequence of RecordedSamples
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    step : float
+        Integration step [s].
+    """
     both = [grids_of(model, manoeuvres, recorded, size) for size in (step, 0.5 * step)]
     return _error(model, manoeuvres, recorded, structure, numbers, z, (both[0], both[1]))
 
@@ -112,7 +136,19 @@ def simulate_padded(
     grids: Sequence[Grid],
     steps: int | None = None,
 ) -> Simulated:
-    """Simulate all recordings on grids of any step, padded so that grids of different steps share compiled code."""
+    """Simulate all recordings on grids of any step, padded so that grids of different steps share compiled code.
+
+    Parameters
+    ----------
+    manoeuvres : sequence of Manoeuvre
+    structure : Structure
+    numbers : Numbers
+    z : (size,) array
+        Coordinates.
+    grids : (R,) sequence of Grid
+    steps : int, optional
+        Number of steps to pad to, by default that of the longest grid.
+    """
     count = steps or max(len(grid.step) for grid in grids)
     count = max(FEWEST_STEPS, 1 << (count - 1).bit_length())
     samples = rounded(max(len(grid.step_of) for grid in grids))
@@ -130,16 +166,16 @@ def _error(
     grids: tuple[list[Grid], list[Grid]],
 ) -> float:
     steps = max(len(grid.step) for grid in grids[1])
-    coarse, fine = (simulate_padded(manoeuvres, structure, numbers, z, item, steps).readings for item in grids)
+    coarse, fine = (simulate_padded(manoeuvres, structure, numbers, z, grid, steps).readings for grid in grids)
     worst = 0.0
     for kind in model.channels.kinds:
-        sigma = np.stack([item.sigma(kind) for item in recorded])
+        sigma = np.stack([samples.sigma(kind) for samples in recorded])
         between = jnp.vectorize(kind.residual, signature="(a),(a)->(c)")
         difference = np.asarray(between(fine.channels[kind.value], coarse.channels[kind.value]))
         worst = max(worst, _largest(difference, sigma[:, None]))
     if model.torque is not None:
         columns = model.torque.columns(model.robot)
-        first, second = (np.asarray(item.torque)[..., columns] for item in (coarse, fine))
+        first, second = (np.asarray(readings.torque)[..., columns] for readings in (coarse, fine))
         worst = max(worst, _largest(first - second, np.array(model.torque.sigma)))
     return worst * 16.0 / 15.0  # error of a fourth-order method from the difference to half the step
 

@@ -20,7 +20,14 @@ __all__ = ["leaving_out", "relinearised", "with_manoeuvres", "with_sensors", "wi
 
 
 def relinearised(posterior: Posterior, z: Floats) -> Posterior:
-    """Return the posterior with the encoders' noise linearised at the coordinates ``z`` (size,)."""
+    """Return the posterior with the encoders' noise linearised at the coordinates ``z`` (size,).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     windows = [old.window for old in posterior.whitenings]
     return replace(posterior, data=_renoised(posterior.data, _whitened(posterior, posterior.data, z, windows)))
 
@@ -59,7 +66,14 @@ def with_sensors(
 
 
 def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Posterior:
-    """Return the posterior without the whitened scalars that masks (O, C), one per recording, mark."""
+    """Return the posterior without the whitened scalars that masks (O, C), one per recording, mark.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    masks : (R,) sequence of (outputs, channels) arrays of bool
+        Samples to leave out.
+    """
     data = _renoised(posterior.data, _without(posterior.whitenings, masks))
     gone = tuple(np.logical_or(mask, old) for mask, old in zip(masks, posterior.data.left_out, strict=True))
     return replace(posterior, data=replace(data, left_out=gone))
@@ -79,7 +93,13 @@ def without_left_out(posterior: Posterior) -> list[Manoeuvre]:
 
 
 def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
-    """Return the posterior of the same model and step given other manoeuvres, of which no sample is left out."""
+    """Return the posterior of the same model and step given other manoeuvres, of which no sample is left out.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    manoeuvres : sequence of Manoeuvre
+    """
     return Posterior.of(posterior.model, manoeuvres, step=posterior.step, flat_prior=posterior.flat_prior)
 
 
@@ -101,7 +121,9 @@ def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[int
 
 
 def _without(whitenings: Sequence[Whitening], masks: Sequence[NDArray[np.bool_]]) -> list[Whitening]:
-    return [item.without(mask) if mask.any() else item for item, mask in zip(whitenings, masks, strict=True)]
+    return [
+        whitening.without(mask) if mask.any() else whitening for whitening, mask in zip(whitenings, masks, strict=True)
+    ]
 
 
 def _renoised(data: Data, whitenings: Sequence[Whitening]) -> Data:

@@ -123,11 +123,25 @@ class StudentT:
 
         Its degrees of freedom are twice the number of dimensions and at least eight: the tails are heavier than the
         posterior's, but not so heavy that most draws in many dimensions lie outside the posterior.
+
+        Parameters
+        ----------
+        mean : (n,) array
+            Mode.
+        covariance : (n, n) array
+            Of the Laplace approximation.
         """
         return cls(mean, np.linalg.cholesky(covariance), max(8.0, 2.0 * len(mean)))
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
-        """Draw points from the distribution, shape (count, n)."""
+        """Draw points from the distribution, shape (count, n).
+
+        Parameters
+        ----------
+        count : int
+            Number of draws.
+        rng : numpy.random.Generator
+        """
         normal = rng.normal(size=(count, len(self.mean)))
         mixing = np.sqrt(self.freedom / rng.chisquare(self.freedom, size=count))
         return self.mean + mixing[:, None] * (normal @ self.factor.T)

@@ -27,23 +27,50 @@ __all__ = ["Arrays", "LinearResponses", "Perturbation", "Traced", "jacobian_of",
 
 
 def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
-    """Return the simulated motion, readings and residual at ``z`` for arrays that may be `perturbed`."""
+    """Return the simulated motion, readings and residual at ``z`` for arrays that may be `perturbed`.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return compiled.traced(posterior.structure, posterior.numbers, on_device(z), arrays)
 
 
 def residual_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
-    """Return the whitened residual (R, O, C) at ``z`` for arrays that may be `perturbed`."""
+    """Return the whitened residual (R, O, C) at ``z`` for arrays that may be `perturbed`.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     return np.asarray(compiled.residuals(posterior.structure, posterior.numbers, on_device(z), arrays))
 
 
 def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
-    """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`."""
+    """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    arrays : Arrays
+        Data, which may be `perturbed`.
+    """
     slopes = compiled.jacobian(posterior.structure, posterior.numbers, on_device(z), arrays)
     return np.moveaxis(np.asarray(slopes), 0, -1)
 
 
 BATCH = 32
-"""Number of pushes that are treated together."""
+"""Number of perturbations that are treated together."""
 
 
 @dataclass(frozen=True)
@@ -69,36 +96,47 @@ class LinearResponses:
 
     @classmethod
     def about(cls, posterior: Posterior, z: Floats, arrays: Arrays) -> LinearResponses:
-        """Linearise the simulation about coordinates and data."""
-        found = compiled.linearised(posterior.structure, posterior.numbers, on_device(z), arrays)
-        return cls(posterior, z, arrays, jax.tree.map(np.asarray, found))
+        """Linearise the simulation about coordinates and data.
 
-    def along(self, pushes: Perturbation) -> Floats:
-        """Return the derivatives of the whitened residual along n stacked pushes, shape (n, R, O, C)."""
-        count = len(pushes.reading)
+        Parameters
+        ----------
+        posterior : Posterior
+        z : (size,) array
+            Coordinates.
+        arrays : Arrays
+            Data, which may be `perturbed`.
+        """
+        motion = compiled.linearised(posterior.structure, posterior.numbers, on_device(z), arrays)
+        return cls(posterior, z, arrays, jax.tree.map(np.asarray, motion))
+
+    def along(self, perturbations: Perturbation) -> Floats:
+        """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
+        count = len(perturbations.reading)
         parts = []
         for first in range(0, count, BATCH):
-            own = jax.tree.map(lambda x, i=first: x[i : i + BATCH], pushes)
-            raw, offset = self._raw(own), own.reading
+            batch = jax.tree.map(lambda x, i=first: x[i : i + BATCH], perturbations)
+            raw, offset = self._raw(batch), batch.reading
             missing = BATCH - len(offset)
             padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in (raw, offset)]
             at = (self.posterior.structure, self.posterior.numbers, on_device(self.z), self.arrays)
             parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: len(offset)])
         return np.concatenate(parts) if parts else np.zeros((0, *self.posterior.residual_shape))
 
-    def _raw(self, pushes: Perturbation) -> Floats:
+    def _raw(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the raw readings, shape (n, R, T, q)."""
         grid, motion = self.arrays.grid, self.motion
         size, samples = np.asarray(grid.step)[..., None, None], np.asarray(grid.step_of)
         steps = size.shape[1]
         halves = [slice(time, time + 2 * steps - 1, 2) for time in STAGE_TIMES]
         forced = [
-            _pushed(motion.input[:, :, stage], pushes.node_rows[:, :, own], pushes.node_wrench[:, :, own])
-            for stage, own in enumerate(halves)
+            _changed_by(
+                motion.input[:, :, stage], perturbations.node_rows[:, :, half], perturbations.node_wrench[:, :, half]
+            )
+            for stage, half in enumerate(halves)
         ]
         slopes, moved = _stages(motion.state, size, forced)
         carried, turned = _stages(motion.state, size, None)
-        state = _pushed(motion.initial, pushes.node_rows[:, :, 0], pushes.node_wrench[:, :, 0])
+        state = _changed_by(motion.initial, perturbations.node_rows[:, :, 0], perturbations.node_wrench[:, :, 0])
         states = np.empty((steps + 1, *state.shape))
         for k in range(steps):
             states[k] = state
@@ -111,13 +149,13 @@ class LinearResponses:
         fraction = np.asarray(grid.fraction)[..., None, None]
         ends = [part[row, samples] for part in (left, right, first, last)]
         there = hermite(ends[0], ends[1], ends[2], ends[3], fraction)
-        found = there @ np.swapaxes(motion.reading_state, -1, -2)
-        found = found + _pushed(motion.reading_input, pushes.sample_rows, pushes.sample_wrench)
-        return np.moveaxis(found, -2, 0)
+        readings = there @ np.swapaxes(motion.reading_state, -1, -2)
+        readings = readings + _changed_by(motion.reading_input, perturbations.sample_rows, perturbations.sample_wrench)
+        return np.moveaxis(readings, -2, 0)
 
 
-def _pushed(derivatives: Floats, rows: Floats, wrench: Floats) -> Floats:
-    """Return what n pushes (n, ..., 28) and (n, ..., 6) change by derivatives (..., m, 34), shape (..., n, m)."""
+def _changed_by(derivatives: Floats, rows: Floats, wrench: Floats) -> Floats:
+    """Return what perturbations (n, ..., 28) and (n, ..., 6) change by derivatives (..., m, 34), (..., n, m)."""
     turned = np.swapaxes(derivatives, -1, -2)
     return np.moveaxis(rows, 0, -2) @ turned[..., :WIDTH, :] + np.moveaxis(wrench, 0, -2) @ turned[..., WIDTH:, :]
 

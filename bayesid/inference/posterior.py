@@ -101,7 +101,7 @@ class Posterior:
         windows = None if window is None else [window] * len(recorded)
         whitenings = whiten(model, recorded, grids, manoeuvres, unknowns, structure, numbers, start, windows)
         arrays = stacked(model, manoeuvres, recorded, grids, whitenings)
-        left_out = tuple(np.zeros_like(item.outputs) for item in whitenings)
+        left_out = tuple(np.zeros_like(whitening.outputs) for whitening in whitenings)
         data = Data(model, tuple(manoeuvres), recorded, tuple(whitenings), left_out, chosen, arrays)
         return cls(data, unknowns, flat_prior)
 
@@ -153,7 +153,9 @@ class Posterior:
     @cached_property
     def log_normalisation(self) -> Floats:
         """Normalisation constant of the log likelihood of each recording, shape (R,)."""
-        return np.array([-0.5 * item.samples * np.log(2.0 * np.pi) - item.log_sigma for item in self.whitenings])
+        return np.array(
+            [-0.5 * whitening.samples * np.log(2.0 * np.pi) - whitening.log_sigma for whitening in self.whitenings]
+        )
 
     def starting_point(self) -> Floats:
         """Return the prior's centre with the initial rates of the first rate samples, shape (size,)."""
@@ -199,7 +201,13 @@ class Posterior:
 
 
 def starting_point(unknowns: Unknowns, recorded: Sequence[RecordedSamples]) -> Floats:
-    """Return the prior's centre with the initial rates of the first rate samples, shape (size,)."""
+    """Return the prior's centre with the initial rates of the first rate samples, shape (size,).
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    recorded : (R,) sequence of RecordedSamples
+    """
     # bodies are exactly zero: the solver scales its first step by the start, which must not be a rounding error
     z = np.zeros(unknowns.size)
     if unknowns.layout.rates:
@@ -209,7 +217,7 @@ def starting_point(unknowns: Unknowns, recorded: Sequence[RecordedSamples]) -> F
 
 
 def _unknowns(model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[RecordedSamples]) -> Unknowns:
-    fastest = max(float(np.abs(item.first_rate).max()) for item in recorded)
+    fastest = max(float(np.abs(samples.first_rate).max()) for samples in recorded)
     speeds, joints = _speed_errors(model, manoeuvres)
     return Unknowns(
         bodies=model.priors,
@@ -228,7 +236,7 @@ def _speed_errors(
 ) -> tuple[tuple[tuple[float, ...], ...], tuple[str, ...]]:
     """Return the standard deviations of the smoothed joint speeds at time 0, by recording, and the joints' names."""
     joints = tuple(joint.name for joint in model.robot.joints)
-    if not model.has_speed_errors or not any(isinstance(item.motion, MeasuredMotion) for item in manoeuvres):
+    if not model.has_speed_errors or not any(isinstance(manoeuvre.motion, MeasuredMotion) for manoeuvre in manoeuvres):
         return (), ()
     return tuple(
         tuple(float(joint.standard_deviation(np.zeros(1))[1, 0]) for joint in manoeuvre.motion.joints)

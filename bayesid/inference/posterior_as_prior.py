@@ -101,6 +101,11 @@ class InertialDraws:
     def changed(self, change: BodyChange, rng: np.random.Generator) -> InertialDraws:
         """Return the draws after a mass-property change, whose uncertain mass is drawn for each of them.
 
+        Parameters
+        ----------
+        change : BodyChange
+        rng : numpy.random.Generator
+
         Raises
         ------
         InputError
@@ -224,7 +229,13 @@ def uncertainty(result: Identification) -> dict[str, Any]:
 
 
 def write_identified(result: Identification, folder: Path) -> None:
-    """Write ``identified.urdf`` and ``identified-uncertainty.json`` to a folder."""
+    """Write ``identified.urdf`` and ``identified-uncertainty.json`` to a folder.
+
+    Parameters
+    ----------
+    result : Identification
+    folder : Path
+    """
     identified_robot(result).write_urdf(folder / "identified.urdf")
     write_json(folder / "identified-uncertainty.json", uncertainty(result))
 

@@ -40,6 +40,12 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
     The group ``posterior`` holds the physical quantities, ``inertial`` with the linear parameters of all bodies,
     marginalised ones included, and ``z`` with the coordinates of standard-normal prior. The other groups are
     ``log_likelihood`` by recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
+
+    Parameters
+    ----------
+    result : Identification
+    rng : numpy.random.Generator
+        Of the sensor noise.
     """
     import arviz as az  # imported here, since it takes a second that commands without samples save
 
@@ -54,8 +60,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
         dims={**dims, **_sensor_dims(result)},
         coords=_coords(result),
     )
-    for name, own in attributes.items():
-        data.posterior[name].attrs.update(own)
+    for name, described in attributes.items():
+        data.posterior[name].attrs.update(described)
     for group in (data.posterior_predictive, data.observed_data):
         for sensor in result.posterior.model.sensors:
             for manoeuvre in result.posterior.manoeuvres:
@@ -73,7 +79,15 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
 
 
 def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
-    """Write `to_arviz` to a NetCDF file, whole or not at all."""
+    """Write `to_arviz` to a NetCDF file, whole or not at all.
+
+    Parameters
+    ----------
+    result : Identification
+    file : Path
+    rng : numpy.random.Generator
+        Of the sensor noise.
+    """
     with complete_file(file) as part:
         to_arviz(result, rng).to_netcdf(str(part))
 
@@ -82,6 +96,14 @@ def write_draws(names: Sequence[str], values: Floats, file: Path) -> None:
     """Write draws (chains, draws, bodies, 10) of the linear parameters of bodies to a file, whole or not at all.
 
     `InertialDraws.read` reads them as it reads the file of a whole posterior.
+
+    Parameters
+    ----------
+    names : (bodies,) sequence of str
+        Names of the bodies.
+    values : (chains, draws, bodies, 10) array
+        Linear parameters, SI.
+    file : Path
     """
     import arviz as az  # imported here, since it takes a second that commands without samples save
 

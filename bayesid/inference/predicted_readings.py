@@ -65,7 +65,14 @@ class PredictedReadings(NamedTuple):
 
 
 def predicted_readings(posterior: Posterior, z: Floats) -> list[PredictedReadings]:
-    """Return the readings of each recording that are predicted at the coordinates ``z`` (size,)."""
+    """Return the readings of each recording that are predicted at the coordinates ``z`` (size,).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     arrays = posterior.data.arrays
     simulated = compiled.simulated(posterior.structure, posterior.numbers, on_device(z), arrays.grid, arrays.attitude)
     return _by_recording(posterior, simulated)
@@ -87,8 +94,8 @@ def _by_recording(posterior: Posterior, simulated: Simulated) -> list[PredictedR
     result = []
     for index, samples in enumerate(posterior.data.recorded):
         count = len(samples.time)
-        own = {kind: values[index, :count] for kind, values in channels.items()}
-        result.append(PredictedReadings(samples.time, own, torque[index, :count]))
+        predicted = {kind: values[index, :count] for kind, values in channels.items()}
+        result.append(PredictedReadings(samples.time, predicted, torque[index, :count]))
     return result
 
 
@@ -98,6 +105,14 @@ def noisy(
     """Return the predicted readings of one recording with fresh white and coloured noise of the sensors.
 
     The error of a prediction that is due to the encoders' noise is left out.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    index : int
+        Number of the recording.
+    predicted : PredictedReadings
+    rng : numpy.random.Generator
     """
     channels = {}
     for sensor in posterior.model.sensors:
@@ -111,7 +126,17 @@ def noisy(
 
 
 def noise_of(sensor: Sensor, time: Floats, sigma: Floats, rng: np.random.Generator) -> Floats:
-    """Draw a sensor's noise at times (T,), white of ``sigma`` (size,) and coloured where declared; shape (T, size)."""
+    """Draw a sensor's noise at times (T,), white of ``sigma`` (size,) and coloured where declared; shape (T, size).
+
+    Parameters
+    ----------
+    sensor : Sensor
+    time : (T,) array
+        Times [s].
+    sigma : (size,) array
+        Of the white noise, in the sensor's unit.
+    rng : numpy.random.Generator
+    """
     noise = sigma * rng.normal(size=(len(time), sensor.kind.size))
     return noise if sensor.coloured is None else noise + _coloured(sensor.coloured, time, rng)
 
@@ -128,7 +153,14 @@ def _coloured(noise: Coloured, time: Floats, rng: np.random.Generator) -> Floats
 
 
 def integration_error_at(posterior: Posterior, z: Floats) -> float:
-    """Return the largest error of any sample due to the integration step at ``z``, in its standard deviations."""
+    """Return the largest error of any sample due to the integration step at ``z``, in its standard deviations.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     data = posterior.data
     return integration_error(
         data.model, data.manoeuvres, data.recorded, posterior.structure, posterior.numbers, z, data.step
@@ -208,7 +240,15 @@ def simulate_manoeuvre(
 
 
 def blank_channels(sensors: Sequence[Sensor], count: int, torque: TorqueSensor | None = None) -> dict[str, Floats]:
-    """Return channels of the sensors at rest, which stand in a recording that is to be simulated."""
+    """Return channels of the sensors at rest, which stand in a recording that is to be simulated.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    count : int
+        Number of samples.
+    torque : TorqueSensor, optional
+    """
     joints = () if torque is None else torque.joints
     return {
         name: np.full(count, value)
@@ -280,7 +320,14 @@ class SensorFit(WhitenedFit):
 
 
 def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
-    """Return measured and predicted readings at coordinates ``z`` (n,): a list per recording, an entry per sensor."""
+    """Return measured and predicted readings at coordinates ``z`` (n,): a list per recording, an entry per sensor.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
     result = []
     for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
@@ -321,7 +368,14 @@ class TorqueFit(WhitenedFit):
 
 
 def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
-    """Return measured and predicted torques at the coordinates ``z`` (n,): a list per recording, an entry per joint."""
+    """Return measured and predicted torques at the coordinates ``z`` (n,): a list per recording, an entry per joint.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (size,) array
+        Coordinates.
+    """
     sensor, robot = posterior.model.torque, posterior.model.robot
     if sensor is None:
         return [[] for _ in posterior.manoeuvres]

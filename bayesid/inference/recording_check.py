@@ -186,7 +186,14 @@ class RecordingCheck:
 
 
 def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
-    """Check one recording of a posterior against the readings that the prior's centre predicts."""
+    """Check one recording of a posterior against the readings that the prior's centre predicts.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    index : int
+        Number of the recording.
+    """
     manoeuvre, model = posterior.manoeuvres[index], posterior.model
     recording = manoeuvre.recording
     predicted = readings_at_start(posterior)[index]
@@ -205,20 +212,20 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
 
 def _stuck(recording: Recording, model: Model) -> tuple[str, ...]:
     """Return the columns of the sensors that never change, where another column of the sensor does."""
-    found: list[str] = []
+    stuck: list[str] = []
     for sensor in model.sensors:
         columns = sensor.kind.columns
         still = [column for column in columns if np.ptp(recording.series(column)[1]) == 0.0]
-        found += still if len(still) < len(columns) else []
-    return tuple(found)
+        stuck += still if len(still) < len(columns) else []
+    return tuple(stuck)
 
 
 def _unused(recording: Recording, model: Model) -> tuple[str, ...]:
     """Return the sensors that a recording holds and the model does not have."""
-    held = {column.partition(".")[0] for column in recording.channels}
+    recorded = {column.partition(".")[0] for column in recording.channels}
     read = {sensor.kind.value for sensor in model.sensors} | ({"torque"} if model.torque is not None else set())
     known = [SensorKind.RATE.value, SensorKind.ACCEL.value, SensorKind.ATTITUDE.value, "torque"]
-    return tuple(family for family in known if family in held - read)
+    return tuple(family for family in known if family in recorded - read)
 
 
 def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:

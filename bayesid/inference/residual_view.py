@@ -45,13 +45,26 @@ class ResidualSpectrum(NamedTuple):
 
 
 def rows_of(posterior: Posterior, recording: int) -> slice:
-    """Return the rows of one recording in the flat residual of a posterior."""
+    """Return the rows of one recording in the flat residual of a posterior.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    recording : int
+        Number of the recording.
+    """
     _, outputs, channels = posterior.residual_shape
     return slice(recording * outputs * channels, (recording + 1) * outputs * channels)
 
 
 def by_recording(posterior: Posterior, values: Floats) -> Floats:
-    """Return what has a row for each element of the flat residual, (N, ...), by recording, (R, N / R, ...)."""
+    """Return what has a row for each element of the flat residual, (N, ...), by recording, (R, N / R, ...).
+
+    Parameters
+    ----------
+    posterior : Posterior
+    values : (N, ...) array
+    """
     return values.reshape(posterior.residual_shape[0], -1, *values.shape[1:])
 
 
@@ -74,12 +87,25 @@ class ResidualView:
 
     @classmethod
     def of(cls, posterior: Posterior, flat: Floats) -> ResidualView:
-        """Return the view of a flat vector (N,)."""
+        """Return the view of a flat vector (N,).
+
+        Parameters
+        ----------
+        posterior : Posterior
+        flat : (N,) array
+        """
         return cls(posterior, flat.reshape(posterior.residual_shape))
 
     @classmethod
     def at(cls, posterior: Posterior, z: Floats) -> ResidualView:
-        """Return the residual of a posterior at the coordinates ``z`` (n,), such as the mode."""
+        """Return the residual of a posterior at the coordinates ``z`` (n,), such as the mode.
+
+        Parameters
+        ----------
+        posterior : Posterior
+        z : (size,) array
+            Coordinates.
+        """
         return cls.of(posterior, posterior.residuals(z))
 
     @property
@@ -96,17 +122,25 @@ class ResidualView:
     def mask(self) -> NDArray[np.bool_]:
         """Whether there is a sample, shape (R, O, C)."""
         there = np.zeros(self.values.shape, dtype=bool)
-        for recording, item in enumerate(self.posterior.whitenings):
-            there[recording, : len(item.outputs)] = item.outputs
+        for recording, whitening in enumerate(self.posterior.whitenings):
+            there[recording, : len(whitening.outputs)] = whitening.outputs
         return there
 
     def columns(self, kind: SensorKind) -> range:
         """Return the channels of one sensor."""
-        own = self.posterior.model.channels.of(kind)
-        return range(own.start, own.stop)
+        channels = self.posterior.model.channels.of(kind)
+        return range(channels.start, channels.stop)
 
     def samples(self, recording: int, channel: int) -> Floats:
-        """Return the values of one channel in one recording where it has samples, shape (n,)."""
+        """Return the values of one channel in one recording where it has samples, shape (n,).
+
+        Parameters
+        ----------
+        recording : int
+            Number of the recording.
+        channel : int
+            Number of the channel.
+        """
         return self.values[recording, self.mask[recording, :, channel], channel]
 
     def each(self, kind: SensorKind) -> list[Floats]:
@@ -114,15 +148,31 @@ class ResidualView:
         return [self.samples(r, channel) for r in range(self.recordings) for channel in self.columns(kind)]
 
     def complete(self, kind: SensorKind, recording: int) -> tuple[Floats, Floats]:
-        """Return times (n,) [s] and values (n, axes) of one sensor in one recording where all its axes have samples."""
-        own, item = self.posterior.model.channels.of(kind), self.posterior.whitenings[recording]
-        rows = np.flatnonzero(self.mask[recording, :, own].all(axis=1))
-        return self.posterior.data.times(recording)[item.rows[rows]], self.values[recording, rows, own]
+        """Return times (n,) [s] and values (n, axes) of one sensor in one recording where all its axes have samples.
+
+        Parameters
+        ----------
+        kind : SensorKind
+        recording : int
+            Number of the recording.
+        """
+        channels, whitening = self.posterior.model.channels.of(kind), self.posterior.whitenings[recording]
+        rows = np.flatnonzero(self.mask[recording, :, channels].all(axis=1))
+        return self.posterior.data.times(recording)[whitening.rows[rows]], self.values[recording, rows, channels]
 
     def series(self, recording: int, kind: SensorKind, axis: int) -> tuple[Floats, Floats]:
-        """Return the times [s] and residuals of one sensor axis in one recording, where it has samples."""
-        item, channel = self.posterior.whitenings[recording], self.columns(kind)[axis]
-        time = self.posterior.data.times(recording)[item.rows[item.outputs[:, channel]]]
+        """Return the times [s] and residuals of one sensor axis in one recording, where it has samples.
+
+        Parameters
+        ----------
+        recording : int
+            Number of the recording.
+        kind : SensorKind
+        axis : int
+            Number of the axis.
+        """
+        whitening, channel = self.posterior.whitenings[recording], self.columns(kind)[axis]
+        time = self.posterior.data.times(recording)[whitening.rows[whitening.outputs[:, channel]]]
         return time, self.samples(recording, channel)
 
     def pooled(self, kind: SensorKind) -> Floats:
@@ -130,7 +180,14 @@ class ResidualView:
         return np.concatenate(self.each(kind))
 
     def spectrum(self, kind: SensorKind, axis: int) -> ResidualSpectrum:
-        """Return the spectrum of one sensor axis, all recordings pooled, in bins of equal width."""
+        """Return the spectrum of one sensor axis, all recordings pooled, in bins of equal width.
+
+        Parameters
+        ----------
+        kind : SensorKind
+        axis : int
+            Number of the axis.
+        """
         parts = [_periodogram(*self.series(recording, kind, axis)) for recording in range(self.recordings)]
         frequency, power = (np.concatenate(columns) for columns in zip(*parts, strict=True))
         if len(frequency) == 0:

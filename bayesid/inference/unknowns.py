@@ -186,7 +186,15 @@ class Unknowns:
         return np.asarray(_inertial_slope(self.layout, self.numbers, on_device(z)))
 
     def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
-        """Return the coordinates of given bodies and initial rates (R, 3), with all others at the prior's centre."""
+        """Return the coordinates of given bodies and initial rates (R, 3), with all others at the prior's centre.
+
+        Parameters
+        ----------
+        inertials : sequence of InertialParameters
+            One for each body.
+        rate : (R, 3) array, optional
+            Initial rates [rad/s].
+        """
         z = np.zeros(self.size)
         theta = [
             body.spread * coordinates_of(body, inertial) for body, inertial in zip(self.bodies, inertials, strict=True)
@@ -369,7 +377,14 @@ class Layout:
     # ---- maps, traced ----
 
     def values(self, numbers: PriorNumbers, z: Array) -> Values:
-        """Return the physical values of standard-normal coordinates, shape (size,)."""
+        """Return the physical values of standard-normal coordinates, shape (size,).
+
+        Parameters
+        ----------
+        numbers : PriorNumbers
+        z : (size,) array
+            Coordinates.
+        """
         vectors = jax.vmap(vector_from_factor)(numbers.factor, self._theta(numbers, z))
         rate = jnp.zeros((self.recordings, 3))
         if self.rates:
@@ -394,6 +409,12 @@ class Layout:
         they are z itself, and so for a body that an effect changes. All other unknowns keep their coordinates. The
         dynamics determines linear combinations of inertial parameters sharply up to a common factor, so that ridges of
         the posterior are straight here.
+
+        Parameters
+        ----------
+        numbers : PriorNumbers
+        z : (size,) array
+            Coordinates.
         """
         entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
         y = jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
@@ -403,7 +424,14 @@ class Layout:
         return y
 
     def from_linear(self, numbers: PriorNumbers, y: Array) -> Array:
-        """Return the inverse of `to_linear`, which is NaN where no physical body has these coordinates."""
+        """Return the inverse of `to_linear`, which is NaN where no physical body has these coordinates.
+
+        Parameters
+        ----------
+        numbers : PriorNumbers
+        y : (size,) array
+            Linear coordinates.
+        """
         entries = numbers.slope @ y[self.all_bodies]
         theta = jax.vmap(absolute)(entries.reshape(self.bodies, PARAMETERS)).ravel()
         z = jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
@@ -413,7 +441,14 @@ class Layout:
         return z
 
     def log_volume(self, numbers: PriorNumbers, z: Array) -> Array:
-        """Return the logarithm of the determinant of d to_linear / d z."""
+        """Return the logarithm of the determinant of d to_linear / d z.
+
+        Parameters
+        ----------
+        numbers : PriorNumbers
+        z : (size,) array
+            Coordinates.
+        """
         changed = sum(log_volume(numbers.effects[index][1] * z[part]) for index, part in self.changed_bodies)
         return jax.vmap(log_volume)(self._theta(numbers, z)).sum() + changed
 

@@ -129,7 +129,17 @@ class Whitening(NamedTuple):
 
 
 def apply(weights: Array, start: Array, residual: Array) -> Array:
-    """Return the whitened residual (O, C) of a residual (T, C) that is padded with zeros for at least one window."""
+    """Return the whitened residual (O, C) of a residual (T, C) that is padded with zeros for at least one window.
+
+    Parameters
+    ----------
+    weights : (O, C, W, C) array
+        Of each output, window and channel.
+    start : (O,) array of int
+        First row of each output's window.
+    residual : (T, C) array
+        Deviations of the readings, in their units.
+    """
     width = weights.shape[2]
     if width == 1:
         return jnp.einsum("oij,oj->oi", weights[:, :, 0], residual[start])
@@ -138,7 +148,14 @@ def apply(weights: Array, start: Array, residual: Array) -> Array:
 
 
 def build(noise: SampleNoise, window: int | None = None) -> Whitening:
-    """Return the whitening of one recording, by default with the shortest window that is accurate."""
+    """Return the whitening of one recording, by default with the shortest window that is accurate.
+
+    Parameters
+    ----------
+    noise : SampleNoise
+    window : int, optional
+        Number of earlier blocks on which each sample is conditioned.
+    """
     outputs = _outputs(noise)
     with threadpool_limits(limits=1):  # threads only slow down thousands of small factorisations
         return _shortest(noise, outputs) if window is None else _whiten(noise, outputs, window)
@@ -270,12 +287,12 @@ def _alike(
 ) -> list[tuple[_Local, list[int]]]:
     """Return the windows that differ, each with the numbers of the blocks that have it."""
     single = [_Local.of(group, channels) for _, group in blocks]
-    found: dict[tuple[bytes, int], tuple[_Local, list[int]]] = {}
+    windows: dict[tuple[bytes, int], tuple[_Local, list[int]]] = {}
     for number, start in enumerate(starts):
         local = _Local.joined(single[max(0, number - window) : number + 1], start * channels)
         key = (local.key, len(blocks[number][1]))
-        found.setdefault(key, (local, []))[1].append(number)
-    return list(found.values())
+        windows.setdefault(key, (local, []))[1].append(number)
+    return list(windows.values())
 
 
 def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, Floats]:

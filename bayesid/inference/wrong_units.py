@@ -240,10 +240,10 @@ def _misfit(posterior: Posterior, compared: Sequence[Sequence[_Comparison]], uni
     """Return chi-square per sample of a fit to rough readings, with accelerations in a unit [m/s2]."""
     model = posterior.model
     loudness: dict[SensorKind, float] = {}
-    for item in (item for seen in compared for item in seen):
-        if item.kind is not None:
-            size = float(np.sqrt((item.measured**2).mean()))
-            loudness[item.kind] = max(loudness.get(item.kind, 0.0), size)
+    for comparison in (comparison for seen in compared for comparison in seen):
+        if comparison.kind is not None:
+            size = float(np.sqrt((comparison.measured**2).mean()))
+            loudness[comparison.kind] = max(loudness.get(comparison.kind, 0.0), size)
     sensors = tuple(
         replace(sensor, noise=White(ROUGH * (unit if sensor.kind == SensorKind.ACCEL else 1.0) * loudness[sensor.kind]))
         if sensor.kind in loudness

@@ -169,6 +169,10 @@ class SetProbabilities:
         """Return the probabilities of the same sets under another prior of causes; no evidence is computed anew."""
         return SetProbabilities.of(self.sets, self.causes, self.generics, prior)
 
+    def with_sets(self, sets: Iterable[CauseSet]) -> SetProbabilities:
+        """Return the probabilities of other sets of the same causes and generic candidates, under the same prior."""
+        return SetProbabilities.of(sets, self.causes, self.generics, self.prior)
+
     @property
     def nothing(self) -> float:
         """Probability that nothing is lacking."""

@@ -1,4 +1,7 @@
-"""Encoders that are noisier than declared: seen in the joints' samples, with the motion smoothed anew."""
+"""Encoders that are noisier than declared: seen in the joints' samples, with the motion smoothed anew.
+
+The noise is that of the samples' high differences (Tintner 1940, The Variate Difference Method).
+"""
 
 from __future__ import annotations
 
@@ -69,6 +72,14 @@ def noise_of(
     over the joints those of which other things are wrong. Differences across an instant of ``jumps``, intervals (n, 2)
     [s] for each series, are left out, as a profile of speed has many. Series of fewer degrees of freedom than
     ``fewest`` are not used.
+
+    Parameters
+    ----------
+    series : sequence of JointSamples
+    fewest : float
+        Smallest number of degrees of freedom of a series that is used.
+    jumps : sequence of (n, 2) arrays, optional
+        Intervals of each series across which no difference is taken [s].
     """
     jumps = [np.zeros((0, 2))] * len(series) if jumps is None else jumps
     every = [_of(one, one.sigma, gaps) for one, gaps in zip(series, jumps, strict=True) if one.sigma is not None]
@@ -117,7 +128,7 @@ class EncoderFault(NoiseFault):
 
     def occurs(self, posterior: Posterior) -> bool:
         """Return whether the motion of any joint is measured."""
-        return any(isinstance(item.motion, MeasuredMotion) for item in posterior.manoeuvres)
+        return any(isinstance(manoeuvre.motion, MeasuredMotion) for manoeuvre in posterior.manoeuvres)
 
     def log_p(self, residual: FitResidual) -> float | None:
         """Return the logarithm of the p-value of the declared noise of all encoders; None where none is declared."""
@@ -142,8 +153,10 @@ class EncoderFault(NoiseFault):
 
 def _smoothed(manoeuvres: Sequence[Manoeuvre], factor: float) -> list[Manoeuvre]:
     return [
-        replace(item, motion=item.motion.with_noise(factor)) if isinstance(item.motion, MeasuredMotion) else item
-        for item in manoeuvres
+        replace(manoeuvre, motion=manoeuvre.motion.with_noise(factor))
+        if isinstance(manoeuvre.motion, MeasuredMotion)
+        else manoeuvre
+        for manoeuvre in manoeuvres
     ]
 
 
@@ -165,6 +178,6 @@ def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Poster
 
 def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
     """Return the noise of all encoders of a posterior by one factor (`noise_of`)."""
-    motions = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
+    motions = [manoeuvre.motion for manoeuvre in posterior.manoeuvres if isinstance(manoeuvre.motion, MeasuredMotion)]
     series = [(one, joint.jump_intervals) for motion in motions for joint in motion.joints for one in joint.series]
     return noise_of([one for one, _ in series], jumps=[intervals for _, intervals in series])

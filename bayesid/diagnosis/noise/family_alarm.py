@@ -1,4 +1,8 @@
-"""Tests of a residual, and the alarm: everything that a model may lack and all faults of its noise as one family."""
+"""Tests of a residual, and the alarm: everything that a model may lack and all faults of its noise as one family.
+
+The smallest of some p-values counts by Šidák's formula for independent ones (Šidák 1967, Rectangular confidence regions
+for the means of multivariate normal distributions, Journal of the American Statistical Association 62).
+"""
 
 from __future__ import annotations
 
@@ -156,15 +160,15 @@ def structure_tests(fit: Fit) -> dict[str, float]:
     The residual of a model that holds is white with unit variance. A fit takes some of that, more at low frequencies,
     so that the p-values are at least as large as they should be.
     """
-    found = {}
+    log_p_values = {}
     for kind in fit.posterior.model.channels.kinds:
         view = fit.view
         parts = [view.complete(kind, recording) for recording in range(view.recordings)]
         pieces = [(time, residual) for time, residual in parts if len(time) > 4]
         if pieces:
-            found[f"period in {kind.value}"] = log_p_of_a_period(pieces)
-            found[f"event in {kind.value}"] = log_p_of_an_event([residual for _, residual in pieces])
-    return found
+            log_p_values[f"period in {kind.value}"] = log_p_of_a_period(pieces)
+            log_p_values[f"event in {kind.value}"] = log_p_of_an_event([residual for _, residual in pieces])
+    return log_p_values
 
 
 def log_p_of_a_period(pieces: list[tuple[Floats, Floats]]) -> float:

@@ -203,7 +203,16 @@ class NoiseFault:
         raise NotImplementedError
 
     def refined(self, fitted: FittedFault, perturbed: PerturbedModel, fit: Fit) -> FittedFault:
-        """Return the fault with a better size, by fits like one that stands without it; by default as it is."""
+        """Return the fault with a better size, by fits like one that stands without it; by default as it is.
+
+        Parameters
+        ----------
+        fitted : FittedFault
+        perturbed : PerturbedModel
+            Under the noise that has the fault.
+        fit : Fit
+            From whose residual the first estimate is.
+        """
         return fitted
 
     def log_charge(self, fitted: FittedFault) -> float:
@@ -213,11 +222,26 @@ class NoiseFault:
         return float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum()) + fitted.log_gain
 
     def in_model(self, model: Model, sizes: Sizes) -> Model:
-        """Return a model with the fault as a study states it; by default it is no matter of the model."""
+        """Return a model with the fault as a study states it; by default it is no matter of the model.
+
+        Parameters
+        ----------
+        model : Model
+        sizes : sequence
+            Value of each quantity of the fault.
+        """
         return model
 
     def in_data(self, model: Model, manoeuvres: Sequence[Manoeuvre], sizes: Sizes) -> list[Manoeuvre]:
-        """Return recordings treated as the stated fault asks; by default as they are."""
+        """Return recordings treated as the stated fault asks; by default as they are.
+
+        Parameters
+        ----------
+        model : Model
+        manoeuvres : sequence of Manoeuvre
+        sizes : sequence
+            Value of each quantity of the fault.
+        """
         return list(manoeuvres)
 
 
@@ -244,15 +268,28 @@ class SensorFault(NoiseFault):
 
     def log_p(self, residual: FitResidual) -> float | None:
         """Return the logarithm of the p-value of the noise of the sensor without this fault."""
-        own = residual.by_sensor[self.kind]
-        return self.log_p_of(own, residual.fit.posterior) if own.degrees > 0.0 else None
+        of_sensor = residual.by_sensor[self.kind]
+        return self.log_p_of(of_sensor, residual.fit.posterior) if of_sensor.degrees > 0.0 else None
 
     def log_p_of(self, residual: SensorResidual, posterior: Posterior) -> float | None:
-        """Return the logarithm of the p-value, given the residual of the sensor; None where it cannot be tested."""
+        """Return the logarithm of the p-value, given the residual of the sensor; None where it cannot be tested.
+
+        Parameters
+        ----------
+        residual : SensorResidual
+        posterior : Posterior
+        """
         raise NotImplementedError
 
     def changed(self, sensor: Sensor, sizes: Sizes) -> Sensor:
-        """Return the sensor with the fault, given the value of each quantity."""
+        """Return the sensor with the fault, given the value of each quantity.
+
+        Parameters
+        ----------
+        sensor : Sensor
+        sizes : sequence
+            Value of each quantity of the fault.
+        """
         raise NotImplementedError
 
     def in_model(self, model: Model, sizes: Sizes) -> Model:
@@ -294,9 +331,9 @@ def noise_faults(kinds: Iterable[SensorKind] | None = None) -> dict[str, NoiseFa
     """Return all faults by their labels: those of sensors, by default of all kinds, one by one, then those of none."""
     kinds = SensorKind.known() if kinds is None else kinds
     of_sensors = [kind for kind in _REGISTER.values() if issubclass(kind, SensorFault)]
-    found: list[NoiseFault] = [fault(kind) for kind in kinds for fault in of_sensors]
-    found += [fault() for fault in _REGISTER.values() if not issubclass(fault, SensorFault)]
-    return {fault.label: fault for fault in found}
+    faults: list[NoiseFault] = [fault(kind) for kind in kinds for fault in of_sensors]
+    faults += [fault() for fault in _REGISTER.values() if not issubclass(fault, SensorFault)]
+    return {fault.label: fault for fault in faults}
 
 
 def number_of(size: float | Sequence[float] | Floats) -> float:

@@ -1,4 +1,8 @@
-"""Faults of a sensor's noise: understated, coloured, with outliers, quantised."""
+"""Faults of a sensor's noise: understated, coloured, with outliers, quantised.
+
+Coloured noise is estimated by Whittle's likelihood (Whittle 1953, Estimation and information in stationary time
+series, Arkiv för Matematik 2).
+"""
 
 from __future__ import annotations
 
@@ -111,7 +115,7 @@ class ColouredNoise(SensorFault):
     def measured(
         self, fit: Fit, least: float = -np.inf, settings: DiagnosisSettings = DEFAULT_SETTINGS
     ) -> FittedFault | None:
-        """Return level and correlation time by Whittle's likelihood of the periodograms (Whittle 1953).
+        """Return level and correlation time by Whittle's likelihood of the periodograms.
 
         The slowest waves have no part in it, since the fit may have taken some of them; they count for what the noise
         may gain at most.
@@ -139,7 +143,9 @@ class ColouredNoise(SensorFault):
 
         typical = float(np.median(spectra.interval))
         starts = [np.array([a, np.log(b * typical)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
-        best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda own: float(own.fun))
+        best = min(
+            (minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda optimum: float(optimum.fun)
+        )
         expected, power = density(best.x, slow), spectra.power[slow]
         slow_gain = float((power - power / expected - np.log(expected)).clip(min=0.0).sum())
         if float(spectra.power[fast].sum()) - best.fun + slow_gain < least:
@@ -276,16 +282,16 @@ class Outliers(SensorFault):
         """Return the fraction of outliers, none of which is in the posterior; None where they are an event."""
         columns, values = fit.posterior.model.channels.of(self.kind), fit.view.values
         masks, outlying, measured = [], [], []
-        for r, item in enumerate(fit.posterior.whitenings):
-            mask = np.zeros_like(item.outputs)
-            own = values[r, : len(mask), columns]
-            scale = max(1.0, float(np.median(np.abs(own[item.outputs[:, columns]])) / 0.6745))
-            mask[:, columns] = item.outputs[:, columns] & (np.abs(own) > settings.outlying * scale)
+        for r, whitening in enumerate(fit.posterior.whitenings):
+            mask = np.zeros_like(whitening.outputs)
+            residual = values[r, : len(mask), columns]
+            scale = max(1.0, float(np.median(np.abs(residual[whitening.outputs[:, columns]])) / 0.6745))
+            mask[:, columns] = whitening.outputs[:, columns] & (np.abs(residual) > settings.outlying * scale)
             mask |= fit.posterior.data.left_out[r]
             masks.append(mask)
-            times = fit.posterior.data.recorded[r].time[item.rows]
+            times = fit.posterior.data.recorded[r].time[whitening.rows]
             outlying.append(times[mask[:, columns].any(axis=1)])
-            measured.append(times[(item.outputs | mask)[:, columns].any(axis=1)])
+            measured.append(times[(whitening.outputs | mask)[:, columns].any(axis=1)])
         if is_event(outlying, measured, settings.event_level):
             return None
         count, total = sum(map(len, outlying)), sum(map(len, measured))
@@ -329,7 +335,7 @@ class Outliers(SensorFault):
             The stated fraction. Where more readings than it makes probable are off, none is left out: then it is the
             model that is off.
         """
-        channels = {name for item in manoeuvres for name in item.recording.channels}
+        channels = {name for manoeuvre in manoeuvres for name in manoeuvre.recording.channels}
         if not channels >= {column for sensor in model.sensors for column in sensor.kind.columns}:
             return list(manoeuvres)  # planned motion, of which nothing is measured yet
         kept = list(manoeuvres)
@@ -435,10 +441,10 @@ def is_event(
     together = 1  # samples of two recordings whose times since the start are so few samples apart coincide
     pairs, chance = 0, 0.0
     interval = max((float(np.median(np.diff(times))) for times in measured if len(times) > 1), default=0.0)
-    for own, times in zip(outlying, measured, strict=True):
-        places = np.searchsorted(times, own)
-        pairs += int((np.abs(np.subtract.outer(places, places)) <= near).sum() - len(own)) // 2
-        chance += near * len(own) * (len(own) - 1) / max(len(times), 1)
+    for instants, times in zip(outlying, measured, strict=True):
+        places = np.searchsorted(times, instants)
+        pairs += int((np.abs(np.subtract.outer(places, places)) <= near).sum() - len(instants)) // 2
+        chance += near * len(instants) * (len(instants) - 1) / max(len(times), 1)
     for (first, its), (second, others) in combinations(zip(outlying, measured, strict=True), 2):
         apart = np.abs(first[:, None] - second[None, :])
         pairs += int((apart < (together + 0.5) * interval).sum())

@@ -114,8 +114,8 @@ def fit_in_amplitudes(
             count = len(linear.parameters)
             sigma = np.array([sizes[place][0] for place in places])
             linear.parameters = tuple(
-                parameter._replace(sigma=float(own), mean=0.0)
-                for parameter, own in zip(linear.parameters, sigma[:count], strict=True)
+                parameter._replace(sigma=float(deviation), mean=0.0)
+                for parameter, deviation in zip(linear.parameters, sigma[:count], strict=True)
             )
             start.append(np.array([sizes[place][1] for place in places]) / sigma)
         else:
@@ -126,7 +126,7 @@ def fit_in_amplitudes(
     expected = point.predicted_cost - gain
     fit = perturbed.fit(scaled, start, z=z, operating=point.fit.operating if same else None)
     if abs(fit.cost - expected) > restart_from and not point.far:  # far from the data no fit finds them from the centre
-        fresh = perturbed.fit(scaled, [np.zeros_like(own) for own in start])
+        fresh = perturbed.fit(scaled, [np.zeros_like(amplitudes) for amplitudes in start])
         fit = fresh if fresh.cost < fit.cost else fit
     if same:
         return fit, expected
@@ -158,8 +158,8 @@ def _mode(point: Linearisation, names: Sequence[str], columns: Integers, deviati
     gain = 0.0
     for name in names:
         if evidence.causes[name].fixed:
-            own = gram.groups[evidence.causes[name].groups[0].name]
-            gain -= float(gram.score[own].sum() + 0.5 * gram.matrix[np.ix_(own, own)].sum())
+            places = gram.groups[evidence.causes[name].groups[0].name]
+            gain -= float(gram.score[places].sum() + 0.5 * gram.matrix[np.ix_(places, places)].sum())
     if not len(columns):
         return np.zeros(0), gain
     block = GaussianBlock.of(gram.matrix[np.ix_(columns, columns)], deviations)
@@ -244,7 +244,14 @@ def extended_posterior(
 
 
 def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
-    """Mode of a hypothesis in the coordinates of its own posterior."""
+    """Mode of a hypothesis in the coordinates of its own posterior.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    posterior : Posterior
+        Of the hypothesis (`extended_posterior`).
+    """
     fit = hypothesis.fit
     z = np.delete(fit.z, hypothesis.perturbed.frozen)
     return np.concatenate([z, *fit.coordinates]) if posterior.size else np.zeros(0)
@@ -252,25 +259,25 @@ def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
 
 def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     """Return a hypothesis at the mode of its own simulation, or as it is where that is worse or does not exist."""
-    found = hypothesis.fit
+    start = hypothesis.fit
     try:
         posterior = extended_posterior(hypothesis)
     except InputError:  # no motion at the prior's centre of the extended model
         return hypothesis
-    if posterior.residual_shape != found.posterior.residual_shape:  # outliers left out: derivatives have other rows
+    if posterior.residual_shape != start.posterior.residual_shape:  # outliers left out: derivatives have other rows
         return hypothesis
     mode = fit_mode(posterior, extended_start(hypothesis, posterior)).z
-    free = len(found.own_coordinates)
-    ends = np.cumsum([free, *(own.size for own in found.coordinates)])
+    free = len(start.own_coordinates)
+    ends = np.cumsum([free, *(values.size for values in start.coordinates)])
     coordinates = [mode[first:last] for first, last in pairwise(ends)]
-    z = found.z.copy()
-    z[np.setdiff1d(np.arange(len(z)), found.frozen)] = mode[:free]
-    perturbed, operating = hypothesis.perturbed, found.operating
+    z = start.z.copy()
+    z[np.setdiff1d(np.arange(len(z)), start.frozen)] = mode[:free]
+    perturbed, operating = hypothesis.perturbed, start.operating
     for _ in range(ROUNDS):
-        exact = perturbed.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
-        operating = perturbed.operating(z, perturbed.pushes(found.effects, coordinates, operating, vibrations=False))
-    if exact.cost > found.cost + CLOSE:
+        exact = perturbed.fit(start.effects, coordinates, z=z, operating=operating, iterations=0)
+        operating = perturbed.operating(z, perturbed.pushes(start.effects, coordinates, operating, vibrations=False))
+    if exact.cost > start.cost + CLOSE:
         return hypothesis
     columns = posterior.jacobian(mode)[: exact.residual.size]
-    own, *added = np.split(columns, ends[:-1], axis=1)
-    return replace(hypothesis, fit=replace(exact, own=own, added=tuple(added)))
+    columns_of_model, *added = np.split(columns, ends[:-1], axis=1)
+    return replace(hypothesis, fit=replace(exact, own=columns_of_model, added=tuple(added)))

@@ -1,4 +1,8 @@
-"""What the most probable causes leave once they are fitted in full: evidence for something else beside them."""
+"""What the most probable causes leave once they are fitted in full: evidence for something else beside them.
+
+A p-value bounds that evidence (Sellke, Bayarri & Berger 2001, Calibration of p values for testing precise null
+hypotheses, The American Statistician 55).
+"""
 
 from __future__ import annotations
 
@@ -49,35 +53,35 @@ def with_misfit(
     fitted: dict[frozenset[str], Hypothesis] = {}
     if search.alarm.silent:
         return search, fitted
-    found = search.probabilities
-    generics = (*found.generics, UNNAMED)
-    found = SetProbabilities.of(found.sets, found.causes, generics, found.prior)
+    probabilities = search.probabilities
+    generics = (*probabilities.generics, UNNAMED)
+    probabilities = SetProbabilities.of(probabilities.sets, probabilities.causes, generics, probabilities.prior)
     for _ in range(settings.most_full_fits):
-        known = (item for item in found.sets if item.causes and item.generic is None)
-        best = next((item for item in known if frozenset(item.causes) not in fitted), None)
+        known = (cause_set for cause_set in probabilities.sets if cause_set.causes and cause_set.generic is None)
+        best = next((cause_set for cause_set in known if frozenset(cause_set.causes) not in fitted), None)
         if best is None or best.probability < settings.fitted_in_full_from:
             break
         under = search.under(best.causes)
         try:
             hypothesis = under.fit(best.causes, effects)
         except InputError:
-            found = _without_motion(found, best)
+            probabilities = _without_motion(probabilities, best)
             continue
         if under.point.far:
             hypothesis = exactly_fitted(hypothesis)
         fitted[frozenset(best.causes)] = hypothesis
         more = log_odds_of_anything(log_p_of_misfit(hypothesis))
         companion = CauseSet(best.causes, UNNAMED, best.log_evidence + more)
-        found = SetProbabilities.of([*found.sets, companion], found.causes, generics, found.prior)
-    return replace(search, probabilities=found), fitted
+        probabilities = probabilities.with_sets([*probabilities.sets, companion])
+    return replace(search, probabilities=probabilities), fitted
 
 
-def _without_motion(found: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
+def _without_motion(probabilities: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
     """Return the probabilities where the evidence of one set speaks for something else alone."""
-    alone = [item for item in found.sets if item.names == (UNNAMED,)]
-    others = [item for item in found.sets if item is not refuted and item not in alone]
-    most = max(item.log_evidence for item in (refuted, *alone))
-    return SetProbabilities.of([*others, CauseSet((), UNNAMED, most)], found.causes, found.generics, found.prior)
+    alone = [cause_set for cause_set in probabilities.sets if cause_set.names == (UNNAMED,)]
+    others = [cause_set for cause_set in probabilities.sets if cause_set is not refuted and cause_set not in alone]
+    most = max(cause_set.log_evidence for cause_set in (refuted, *alone))
+    return probabilities.with_sets([*others, CauseSet((), UNNAMED, most)])
 
 
 def log_p_of_misfit(hypothesis: Hypothesis) -> float:
@@ -89,7 +93,6 @@ def log_p_of_misfit(hypothesis: Hypothesis) -> float:
 def log_odds_of_anything(log_p: float) -> float:
     """Return the largest log Bayes factor of any alternative that a p-value allows, ``-log(-e p log p)``.
 
-    It holds for every alternative under which the p-value's density decreases (Sellke, Bayarri & Berger 2001, The
-    American Statistician 55), and is zero from ``1 / e`` on.
+    It holds for every alternative under which the p-value's density decreases, and is zero from ``1 / e`` on.
     """
     return float(-1.0 - log_p - np.log(-log_p)) if log_p < -1.0 else 0.0

@@ -62,8 +62,13 @@ class ModelSearch:
         ----------
         bound, floor : float
         """
-        found = self.probabilities
-        matter = {name for item in found.sets if item.probability >= self.settings.matters for name in item.names}
+        probabilities = self.probabilities
+        matter = {
+            name
+            for cause_set in probabilities.sets
+            if cause_set.probability >= self.settings.matters
+            for name in cause_set.names
+        }
         wider = {
             search.noise.names: SetEvidence(
                 search.point.evidence.gram,
@@ -76,16 +81,16 @@ class ModelSearch:
             for search in self.searches
         }
         sets = []
-        for item in found.sets:
-            search = self.under(item.causes)
+        for cause_set in probabilities.sets:
+            search = self.under(cause_set.causes)
             evidence = search.point.evidence
-            names = [name for name in item.names if name in evidence.causes]
-            if item.probability >= self.settings.matters and names:
+            names = [name for name in cause_set.names if name in evidence.causes]
+            if cause_set.probability >= self.settings.matters and names:
                 forms = [evidence.forms(names)]
                 change = wider[search.noise.names].log_evidence(names, forms) - evidence.log_evidence(names, forms)
-                item = replace(item, log_evidence=item.log_evidence + change)
-            sets.append(item)
-        return SetProbabilities.of(sets, found.causes, found.generics, found.prior)
+                cause_set = replace(cause_set, log_evidence=cause_set.log_evidence + change)
+            sets.append(cause_set)
+        return probabilities.with_sets(sets)
 
     def classes(self) -> tuple[tuple[str, ...], ...]:
         """Return the causes in classes of equivalents; a fault of the noise is a class of its own."""
@@ -149,11 +154,11 @@ def _joined(searches: Sequence[SetSearch], faults: Sequence[str]) -> SetProbabil
     every = []
     for search in searches:
         offset = search.log_nothing - declared.log_nothing
-        for item in search.probabilities.sets:
-            causes = tuple(sorted((*item.causes, *search.noise.names)))
-            every.append(replace(item, causes=causes, log_evidence=item.log_evidence + offset))
-    found = declared.probabilities
-    return SetProbabilities.of(every, (*found.causes, *faults), found.generics, found.prior)
+        for cause_set in search.probabilities.sets:
+            causes = tuple(sorted((*cause_set.causes, *search.noise.names)))
+            every.append(replace(cause_set, causes=causes, log_evidence=cause_set.log_evidence + offset))
+    probabilities = declared.probabilities
+    return SetProbabilities.of(every, (*probabilities.causes, *faults), probabilities.generics, probabilities.prior)
 
 
 def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, progress: Progress) -> list[SetSearch]:

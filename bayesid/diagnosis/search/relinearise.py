@@ -53,10 +53,20 @@ class SetSearch:
     @property
     def highest(self) -> float:
         """Log evidence of the best explanation."""
-        return self.log_nothing + max(item.log_evidence for item in self.probabilities.sets)
+        return self.log_nothing + max(cause_set.log_evidence for cause_set in self.probabilities.sets)
 
     def fit(self, causes: Sequence[str], effects: Sequence[Effect], hopeless: float = np.inf) -> Hypothesis:
-        """Fit the present model with some causes (`fit_hypothesis`)."""
+        """Fit the present model with some causes (`fit_hypothesis`).
+
+        Parameters
+        ----------
+        causes : sequence of str
+            Names of causes.
+        effects : sequence of Effect
+            Candidates of the catalogue.
+        hopeless : float
+            Cost at which a fit that nears its end is given up.
+        """
         return fit_hypothesis(self.point, self.noise.faults, causes, effects, hopeless)
 
 
@@ -73,13 +83,13 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
     if base is None and noise.bodies_fixed:
         base = linearise_along_data(noise.perturbed, catalogue)
     base = _with_suggested(linearise(noise.perturbed, noise.fit, catalogue) if base is None else base)
-    point, found, best = *_tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue), base.fit
+    point, probabilities, best = *_tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue), base.fit
     if base.bodies_fixed:
-        point, found = _about_large_causes(point, found, catalogue)
+        point, probabilities = _about_large_causes(point, probabilities, catalogue)
         best = point.fit
     else:
         for _ in range(catalogue.settings.most_linearisations):
-            causes = _best_known(found, catalogue)
+            causes = _best_known(probabilities, catalogue)
             if not causes:
                 break
             fit, expected = fit_in_amplitudes(point, causes, catalogue.effects, catalogue.settings.restart_from)
@@ -89,23 +99,25 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
             if abs(fit.cost - expected) < catalogue.settings.agrees:
                 break
             point = _with_suggested(linearise(point.perturbed, best, catalogue))
-            point, found = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
-    return SetSearch(noise, point.without_products(), found, best)
+            point, probabilities = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
+    return SetSearch(noise, point.without_products(), probabilities, best)
 
 
 def _tuned(
-    point: Linearisation, found: SetProbabilities, catalogue: Catalogue
+    point: Linearisation, probabilities: SetProbabilities, catalogue: Catalogue
 ) -> tuple[Linearisation, SetProbabilities]:
     """Resolve plausible forms between those of the grid, such as frequencies of vibrations and instants of a jump."""
     for kind in cause_kinds():
-        refined = kind.refined(point, found, kind.of(catalogue.effects), catalogue.bounds, catalogue.settings.plausible)
+        refined = kind.refined(
+            point, probabilities, kind.of(catalogue.effects), catalogue.bounds, catalogue.settings.plausible
+        )
         if refined is not point:
-            point, found = refined, enumerate_sets(refined.evidence, catalogue.prior)
-    return point, found
+            point, probabilities = refined, enumerate_sets(refined.evidence, catalogue.prior)
+    return point, probabilities
 
 
 def _about_large_causes(
-    base: Linearisation, found: SetProbabilities, catalogue: Catalogue
+    base: Linearisation, probabilities: SetProbabilities, catalogue: Catalogue
 ) -> tuple[Linearisation, SetProbabilities]:
     """Weigh every set about the nearest motion, where the present model itself comes nowhere near the data.
 
@@ -115,9 +127,9 @@ def _about_large_causes(
     """
     near: dict[frozenset[str], _Near] = {}
     fitted: set[frozenset[str]] = set()
-    point, along = base, found
+    point, along = base, probabilities
     for _ in range(catalogue.settings.most_linearisations):
-        names = frozenset(_best_known(found, catalogue))
+        names = frozenset(_best_known(probabilities, catalogue))
         if not names or names in fitted:
             break
         fit, _ = fit_in_amplitudes(base, sorted(names), catalogue.effects, catalogue.settings.restart_from)
@@ -127,8 +139,8 @@ def _about_large_causes(
         point = _with_suggested(linearise(base.perturbed, fit, catalogue, far=True))
         large = _large(point, names, catalogue.settings.cannot_be_left_out)
         near[large] = _Near(point, enumerate_sets(point.evidence, catalogue.prior, beside=large))
-        found = _nearest(_Near(base, along), near, point.log_nothing)
-    return point, found
+        probabilities = _nearest(_Near(base, along), near, point.log_nothing)
+    return point, probabilities
 
 
 def _large(point: Linearisation, names: frozenset[str], least: float) -> frozenset[str]:
@@ -145,21 +157,20 @@ class _Near(NamedTuple):
     """A linearisation, and the sets that are weighed there."""
 
     point: Linearisation
-    found: SetProbabilities
+    probabilities: SetProbabilities
 
 
 def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: float) -> SetProbabilities:
     """Return the probabilities of all sets, each from the fit with most of its large causes, or else along the data."""
     best: dict[tuple[tuple[str, ...], str | None], tuple[int, CauseSet]] = {}
-    for size, (point, found) in [(0, along), *((len(names), there) for names, there in near.items())]:
-        for item in found.sets:
-            key = (item.causes, item.generic)
+    for size, (point, probabilities) in [(0, along), *((len(names), there) for names, there in near.items())]:
+        for cause_set in probabilities.sets:
+            key = (cause_set.causes, cause_set.generic)
             if key not in best or size >= best[key][0]:
-                moved = replace(item, log_evidence=item.log_evidence + point.log_nothing - log_nothing)
+                moved = replace(cause_set, log_evidence=cause_set.log_evidence + point.log_nothing - log_nothing)
                 best[key] = size, moved
-    catalogue = along.found
-    sets = (item for _, item in best.values())
-    return SetProbabilities.of(sets, catalogue.causes, catalogue.generics, catalogue.prior)
+    sets = (cause_set for _, cause_set in best.values())
+    return along.probabilities.with_sets(sets)
 
 
 def _with_suggested(point: Linearisation) -> Linearisation:
@@ -170,22 +181,26 @@ def _with_suggested(point: Linearisation) -> Linearisation:
     return extended
 
 
-def _best_known(found: SetProbabilities, catalogue: Catalogue) -> tuple[str, ...]:
+def _best_known(probabilities: SetProbabilities, catalogue: Catalogue) -> tuple[str, ...]:
     """Return the most probable set that names all of its causes; none where one of them has several forms."""
-    best = next((item.causes for item in found.sets if item.causes and item.generic is None), ())
+    best = next(
+        (cause_set.causes for cause_set in probabilities.sets if cause_set.causes and cause_set.generic is None), ()
+    )
     return best if all(kind_of(effect).one_form for effect in catalogue.effects if effect.label in best) else ()
 
 
-def plausible_vibrations(found: SetProbabilities, catalogue: Catalogue) -> bool:
+def plausible_vibrations(probabilities: SetProbabilities, catalogue: Catalogue) -> bool:
     """Return whether a cause of a kind whose evidence takes a fit, such as a vibration, is plausible.
 
     Parameters
     ----------
-    found : SetProbabilities
+    probabilities : SetProbabilities
     catalogue : Catalogue
     """
     kinds = (kind for kind in cause_kinds() if kind.weighed_by_fits)
-    return any(kind.plausible(found, kind.of(catalogue.effects), catalogue.settings.plausible) for kind in kinds)
+    return any(
+        kind.plausible(probabilities, kind.of(catalogue.effects), catalogue.settings.plausible) for kind in kinds
+    )
 
 
 def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch:
@@ -200,12 +215,12 @@ def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch
     search : SetSearch
     catalogue : Catalogue
     """
-    point, found = search.point, search.probabilities
+    point, probabilities = search.point, search.probabilities
     gains: dict[str, float] = {}
     fits: dict[str, Fit] = {}
-    each = {item.names: item.log_evidence for item in found.sets}
+    each = {cause_set.names: cause_set.log_evidence for cause_set in probabilities.sets}
     linear = {}
-    for label, others in companies(found, catalogue.weighed_by_fits).items():
+    for label, others in companies(probabilities, catalogue.weighed_by_fits).items():
         names = tuple(sorted((*others, label)))
         linear[label, names] = each[names] if names in each else point.evidence.log_evidence(names)
     for label, names in sorted(linear, key=lambda key: -linear[key]):
@@ -218,24 +233,24 @@ def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch
         gains[label] = max(fits[label].log_evidence - point.log_nothing - linear[label, names], 0.0)
     if not gains:
         return search
-    sets = [replace(item, log_evidence=_corrected(item, gains, each)) for item in found.sets]
-    corrected = SetProbabilities.of(sets, found.causes, found.generics, found.prior)
-    top = next((item for item in corrected.sets if item.names), None)
+    sets = [replace(cause_set, log_evidence=_corrected(cause_set, gains, each)) for cause_set in probabilities.sets]
+    corrected = probabilities.with_sets(sets)
+    top = next((cause_set for cause_set in corrected.sets if cause_set.names), None)
     named = [label for label in fits if top is not None and label in top.causes]
     return replace(search, probabilities=corrected, best=fits[named[0]] if named else search.best)
 
 
-def _corrected(item: CauseSet, gains: Mapping[str, float], known: Mapping[tuple[str, ...], float]) -> float:
+def _corrected(cause_set: CauseSet, gains: Mapping[str, float], known: Mapping[tuple[str, ...], float]) -> float:
     """Return the log evidence of a set with the gain of its vibration.
 
     Two vibrations of the linear model may stand for one that is not linear: a set with both is at least as probable as
     one of them fitted, but does not gain again.
     """
-    vibrations = [name for name in item.causes if name in gains]
+    vibrations = [name for name in cause_set.causes if name in gains]
     if len(vibrations) < 2:
-        return item.log_evidence + sum(gains[name] for name in vibrations)
-    values = [item.log_evidence]
+        return cause_set.log_evidence + sum(gains[name] for name in vibrations)
+    values = [cause_set.log_evidence]
     for label in vibrations:
-        fewer = tuple(name for name in item.names if name == label or name not in vibrations)
+        fewer = tuple(name for name in cause_set.names if name == label or name not in vibrations)
         values.append(known.get(fewer, -np.inf) + gains[label])
     return max(values)
