@@ -62,7 +62,7 @@ class NoiseModel:
         """Return the model with one fault more, whose size is estimated from a residual.
 
         It is None if the residual shows no such fault, if the fault beside what the residual's fit holds would be far
-        behind the best explanation, or if the fault is known with this size.
+        behind the best explanation, if the fault is known with this size, or if no fit has finite derivatives under it.
 
         Parameters
         ----------
@@ -88,8 +88,8 @@ class NoiseModel:
         perturbed = perturbed.with_posterior(fault.posterior)
         charge = self.log_charge + fault.log_charge
         model = NoiseModel((*self.faults, fault), perturbed, perturbed.fit(z=self.fit.z), charge, self.bodies_fixed)
-        far_behind = model.log_nothing < best - settings.fault_alone_far_behind
-        return None if residual is self.fit and far_behind else model
+        far_behind = residual is self.fit and model.log_nothing < best - settings.fault_alone_far_behind
+        return None if far_behind or not np.isfinite(model.fit.cost) else model
 
     def has(self, fault: FittedFault) -> bool:
         """Return whether there is a fault of this name and about this size."""

@@ -244,6 +244,8 @@ class _Spectra:
 
 def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
     """Return standard deviations from a paraboloid through points (n, 2) of a loss, (n,), if it has a bowl."""
+    if not np.isfinite(values).all():  # a fit failed
+        return otherwise
     x, y = (points - points[np.argmin(values)]).T
     terms = np.stack([np.ones_like(x), x, y, 0.5 * x**2, x * y, 0.5 * y**2], axis=1)
     _, _, _, xx, xy, yy = np.linalg.lstsq(terms, values, rcond=None)[0]

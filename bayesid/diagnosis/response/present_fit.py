@@ -23,6 +23,7 @@ import numpy as np
 from jax import Array
 from scipy.stats import chi2
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
@@ -129,6 +130,11 @@ def _followed(perturbed: PerturbedModel, start: Floats) -> Fit:
 def _fit_beside_bodies(perturbed: PerturbedModel) -> Fit:
     """Return the fit of everything but the bodies, with the derivatives in the bodies, too."""
     held = bodies_frozen(perturbed).fit()
+    if not np.isfinite(held.cost):
+        raise InputError(
+            "the motion of the model has no finite derivatives, even with all bodies at their prior's centre",
+            remedy="Check the units of joint motion and of the robot's inertial parameters",
+        )
     return replace(perturbed.fit(z=held.z, operating=held.operating, iterations=0), converged=held.converged)
 
 
