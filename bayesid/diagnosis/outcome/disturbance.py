@@ -22,10 +22,9 @@ from bayesid.diagnosis.candidates.linear_model import SignatureBank
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken
+from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken, torque_responses
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
-from bayesid.inference.residual_view import by_recording
 
 __all__ = ["DisturbingWrench", "Frame", "TorqueCorrelation", "disturbing_wrench", "torque_correlations"]
 
@@ -316,18 +315,14 @@ def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
 
 def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
     """Return the responses to cosines of a torque along the axes of frames, (N, R WAVES 3)."""
-    perturbed, fit = hypothesis.perturbed, hypothesis.fit
-    operating = fit.operating
+    operating = hypothesis.fit.operating
     ends = np.asarray(operating.node.environment.time).max(axis=1)
-    wrenches = []
+    torques = []
     for instant, axes in ((operating.node, frames), (operating.sample, samples)):
         time = np.asarray(instant.environment.time)
         waves = np.cos(np.pi * np.arange(WAVES)[:, None, None] * time / ends[:, None])
-        wrench = np.zeros((WAVES, 3, *time.shape, 6))
-        wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
-        wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
-    perturbation = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    return block_diag(*by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data)))
+        torques.append(np.einsum("krt,rtba->kartb", waves, axes).reshape(WAVES * 3, *time.shape, 3))
+    return block_diag(*torque_responses(hypothesis, *torques))
 
 
 def _fixed_in(

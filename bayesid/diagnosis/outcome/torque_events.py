@@ -21,7 +21,7 @@ from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
-__all__ = ["ChosenEvents", "EventCandidates", "Taken"]
+__all__ = ["ChosenEvents", "EventCandidates", "Taken", "torque_responses"]
 
 INSTANTS = 80  # per recording, at which a torque may set in
 DECAYS = (1.0 / 160.0, 1.0 / 40.0, 1.0 / 10.0, np.inf)
@@ -140,15 +140,12 @@ class EventCandidates:
         count, recordings = len(shapes), len(ends)
         # between two nodes of the integration a jump would be lost: there it is averaged over a step
         longest = np.asarray(perturbed.posterior.data.arrays.grid.step).max(axis=1)
-        wrenches = []
+        torques = []
         for time, width in zip(times, (longest, np.zeros(recordings)), strict=True):
-            torques = np.stack([_courses(*row, shapes) for row in zip(time, ends, width, strict=True)], axis=1)
-            wrench = np.zeros((count, 3, *time.shape, 6))
-            for axis in range(3):
-                wrench[:, axis, :, :, 3 + axis] = torques  # (k, R, S)
-            wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
-        perturbation = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-        blocks = by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data))
+            courses = np.stack([_courses(*row, shapes) for row in zip(time, ends, width, strict=True)], axis=1)
+            about_axes = courses[:, None, ..., None] * np.eye(3)[:, None, None]  # (k, 3, R, S, 3)
+            torques.append(about_axes.reshape(3 * count, *time.shape, 3))
+        blocks = torque_responses(hypothesis, *torques)
         known, residual, apart = (by_recording(fit.posterior, x) for x in (fit.known, fit.residual, smooth))
         cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
         taken, of_smooth = fit.block.share(cross), fit.block.share(fit.known.T @ smooth)
@@ -274,6 +271,21 @@ class EventCandidates:
         score = self.score[columns] - taken.share[:, columns].T @ taken.pull
         block = GaussianBlock.of(rest[:, columns], np.full(3, deviation))
         return Taken(np.concatenate([taken.share, block.share(rest)]), np.concatenate([taken.pull, block.share(score)]))
+
+
+def torque_responses(hypothesis: Hypothesis, nodes: Floats, samples: Floats) -> Floats:
+    """Return the responses of the whitened residual of each recording to torques on the base, (R, N / R, k).
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    nodes, samples : (k, R, S, 3) and (k, R, T, 3) arrays
+        Torques in base axes at the nodes of the integration and at the samples [N m].
+    """
+    perturbed, fit = hypothesis.perturbed, hypothesis.fit
+    node, sample = (np.concatenate([np.zeros_like(torque), torque], axis=-1) for torque in (nodes, samples))
+    perturbation = perturbed.perturbation(len(node), node_wrench=node, sample_wrench=sample)
+    return by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data))
 
 
 def _courses(time: Floats, end: float, width: float, shapes: Floats) -> Floats:
