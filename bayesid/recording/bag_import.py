@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
 from bayesid.recording.bag_channels import (
     ATTITUDES,
     IMU,
@@ -151,7 +152,8 @@ class BagTopics:
     def __post_init__(self) -> None:
         if self.imu is None and self.attitude is None:
             raise InputError("no sensor of the base is named", remedy="Give --imu TOPIC, --attitude TOPIC or both")
-        named = [*self.joints, *({self.imu, self.attitude} - {None})]  # an IMU may tell its attitude, too
+        # one topic may be both: an IMU may tell its attitude, too
+        named = [*self.joints, *{name for name in (self.imu, self.attitude) if name is not None}]
         if not 0.0 <= self.most_faulty < 1.0:
             problem = f"the largest share of faulty messages is {self.most_faulty:g}"
             raise InputError(problem, place="--most-faulty", remedy="Give a fraction from 0 to below 1")
@@ -203,7 +205,7 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
         If the bag or a topic cannot be read, the topics are stamped by different clocks, a topic has no message in the
         window, too many messages of one are faulty, a joint is in two topics, or the IMU feels gravity.
     """
-    kinds = dict.fromkeys(selected.joints, JOINTS)
+    kinds: dict[str, tuple[str, ...]] = dict.fromkeys(selected.joints, JOINTS)
     for name, allowed in ((selected.attitude, ATTITUDES), (selected.imu, IMU)):
         kinds |= {} if name is None else {name: allowed}
     whole = read_topics(bag, kinds)
@@ -220,14 +222,11 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
         read.append((used, joint_channels(used, names, velocity=selected.velocity, effort=selected.effort), ""))
     joints = [stamps for _, channels, _ in read for stamps, _ in channels.values()]
     known = max(int(stamps[0]) for stamps in joints), min(int(stamps[-1]) for stamps in joints)
-    base = [
-        *(
-            []
-            if selected.imu is None
-            else [(sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel))]
-        ),
-        *([] if selected.attitude is None else [(sound(selected.attitude, attitude_fault), attitude_channels)]),
-    ]
+    base: list[tuple[StampedTopic, Callable[[StampedTopic], Channels]]] = []
+    if selected.imu is not None:
+        base.append((sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel)))
+    if selected.attitude is not None:
+        base.append((sound(selected.attitude, attitude_fault), attitude_channels))
     _refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
     for topic, channels_of in base:
         inside = _during(arms[0], topic, known)
@@ -262,7 +261,8 @@ def _recording(bag: Path, by_topic: Sequence[Channels]) -> tuple[Recording, int]
 
 
 def _described(topic: StampedTopic, channels: Channels, frame: str, messages: int) -> ImportedTopic:
-    steps = [np.diff(np.unique(stamps)) / 1e9 for stamps, _ in channels.values() if len(stamps) > 1] or [np.zeros(1)]
+    sampled = [np.unique(stamps) for stamps, _ in channels.values() if len(stamps) > 1]
+    steps: list[Floats] = [np.diff(stamps) / 1e9 for stamps in sampled] or [np.zeros(1)]
     return ImportedTopic(
         name=topic.name,
         kind=topic.kind,

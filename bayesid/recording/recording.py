@@ -359,8 +359,8 @@ def _read_csv(file: Path) -> dict[str, Array]:
 
 
 def _read_parquet(file: Path) -> dict[str, Array]:
-    import pyarrow as pa  # type: ignore[import-untyped]  # here, as sensors import this module and CSV needs none
-    import pyarrow.parquet as pq  # type: ignore[import-untyped]
+    import pyarrow as pa  # here, as sensors import this module and CSV needs none
+    import pyarrow.parquet as pq
 
     try:
         # not pq.read_table, which fails obscurely on duplicate columns

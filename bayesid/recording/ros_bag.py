@@ -129,7 +129,7 @@ class StampedTopic:
         last: dict[tuple[int, tuple[str, ...]], int] = {}
         offset = np.median((stamps - self.arrivals)[inside]) if inside.any() else 0.0
         repeated = np.zeros(len(stamps), dtype=bool)
-        for row in np.flatnonzero(inside):
+        for row in np.flatnonzero(inside).tolist():
             repeated[row] = seen.setdefault(self.contents[row], row) != row
             faults[row] = faults[row] or fault(self.messages[row])
             if repeated[row] or faults[row]:
@@ -262,7 +262,7 @@ def _stamped(bag: Path, name: str, kind: str, read: Sequence[tuple[int, Any, byt
     headers = [message.header for _, message, _ in read]
     stamps = np.array([header.stamp.sec * 10**9 + header.stamp.nanosec for header in headers], dtype=np.int64)
     arrivals = np.array([arrival for arrival, _, _ in read], dtype=np.int64)
-    messages, contents = (tuple(each[place] for each in read) for place in (1, 2))
+    messages, contents = tuple(message for _, message, _ in read), tuple(content for *_, content in read)
     topic = StampedTopic(bag, name, kind, stamps, arrivals, messages, contents)
     if not read:
         raise topic.error("it has no messages", remedy="Name a topic that was recorded")
