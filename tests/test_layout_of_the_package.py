@@ -22,12 +22,12 @@ REFUSED = {
 
 # vague identifiers with the number of places that may still bind each, by part of the package: none may grow
 VAGUE: dict[str, dict[str, int]] = {
-    "held": {"diagnosis": 5, "inference": 1},
-    "own": {"diagnosis": 48, "inference": 7, "report": 2},
-    "found": {"diagnosis": 53, "inference": 9, "report": 8},
-    "item": {"diagnosis": 75, "inference": 23, "report": 56},
-    "wanted": {"app": 1, "diagnosis": 1, "inference": 2, "report": 1},
-    "push": {"diagnosis": 7},
+    "held": {"diagnosis": 3},
+    "own": {"diagnosis": 24, "report": 2},
+    "found": {"diagnosis": 21, "report": 8},
+    "item": {"diagnosis": 39, "identifiability": 1, "report": 56},
+    "wanted": {"app": 1, "diagnosis": 1, "report": 1},
+    "push": {"diagnosis": 5},
     "tone": {"diagnosis": 10},
 }
 
