@@ -225,7 +225,7 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
     if not result.bodies:
         return []
     sentences = []
-    if all(item.verdict is not ContractionVerdict.CONTRACTED for item in result.contraction.values()):
+    if all(contraction.verdict is not ContractionVerdict.CONTRACTED for contraction in result.contraction.values()):
         sentences.append(f"These recordings do not determine {abridged(list(result.bodies))}.")
     for verdict, text in (
         (ContractionVerdict.NOT, "is the prior"),
