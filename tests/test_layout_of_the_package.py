@@ -25,7 +25,7 @@ VAGUE: dict[str, dict[str, int]] = {
     "held": {"diagnosis": 3},
     "own": {"diagnosis": 24, "report": 2},
     "found": {"diagnosis": 21, "report": 8},
-    "item": {"diagnosis": 39, "identifiability": 1, "report": 56},
+    "item": {"diagnosis": 39, "report": 56},
     "wanted": {"app": 1, "diagnosis": 1, "report": 1},
     "push": {"diagnosis": 5},
     "tone": {"diagnosis": 10},
