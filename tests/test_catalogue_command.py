@@ -34,7 +34,7 @@ from bayesid import Instrument, SensorKind
 
 @SensorKind.register
 class Field(SensorKind):
-    value, unit = "field", "T"
+    value, unit = "magnetic", "T"
     instrument = Instrument("magnetometer", "the field", bias_sigma=1e-7, drift_sigma=1e-9)
 
     def read(self, sensed):
@@ -123,16 +123,16 @@ def test_sizes_are_those_of_a_study_with_its_plugins(tmp_path):
 def test_a_sensor_of_ones_own_has_faults(tmp_path, monkeypatch):
     monkeypatch.setattr(SensorKind, "_known", dict(SensorKind._known))
     text = DEMONSTRATION.read_text(encoding="utf-8").replace('urdf = "', f'urdf = "{DEMONSTRATION.parent}/')
-    section = "[sensors.other.field]\nsigma = 1e-5\n\n[sensors.rate]"
+    section = "[sensors.other.magnetic]\nsigma = 1e-5\n\n[sensors.rate]"
     text = text.replace("[sensors.rate]", section, 1) + 'plugins = ["field.py"]\n'
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")
     (tmp_path / "field.py").write_text(SENSOR, encoding="utf-8")
     status, output = run("--study", tmp_path / "study.toml")
     assert status == 0, output
     assert "rate-bias The rate sensor reads a constant" in output
-    assert "field-drift The magnetometer's zero wanders steadily" in output
+    assert "magnetic-drift The magnetometer's zero wanders steadily" in output
     assert "x, y, z [T/s]: normal, mean 0, standard deviation 1 × 10⁻⁹" in output
-    assert output.count("Needs: [sensors.other.field]") == 6
+    assert output.count("Needs: [sensors.other.magnetic]") == 6
 
 
 def test_an_unknown_effect_is_answered_with_the_known_ones():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis.candidates.cause_kind import companies
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities
 from bayesid.diagnosis.noise import UnderstatedNoise
 from bayesid.diagnosis.noise.noise_fault import FittedFault
@@ -55,7 +56,7 @@ def test_the_linear_model_has_the_evidence_of_the_fit_that_it_stands_on(biased):
 
 def test_a_fit_in_amplitudes_ends_where_the_linear_model_says(biased):
     (effect, _) = biased.catalogue.effects
-    fit, expected = fit_in_amplitudes(biased.point, [effect])
+    fit, expected = fit_in_amplitudes(biased.point, [effect.label], biased.catalogue.effects)
     assert fit.cost == pytest.approx(expected, abs=DEFAULT_SETTINGS.agrees)
     assert fit.cost < biased.fit.cost - 20.0
     np.testing.assert_allclose(fit.values(0).ravel(), BIAS, atol=5.0 * SIGMA / np.sqrt(81))
@@ -64,7 +65,7 @@ def test_a_fit_in_amplitudes_ends_where_the_linear_model_says(biased):
 def test_about_a_fit_with_a_cause_the_evidence_of_sets_is_the_same(biased):
     """Where the model is linear it does not matter about which fit it is linearised."""
     (effect, _) = biased.catalogue.effects
-    fit, _ = fit_in_amplitudes(biased.point, [effect])
+    fit, _ = fit_in_amplitudes(biased.point, [effect.label], biased.catalogue.effects)
     there = linearise(biased.perturbed, fit, biased.catalogue)
     names = ["accel-bias"]
     here = biased.point.log_nothing + biased.point.evidence.log_evidence(names)
@@ -98,7 +99,9 @@ def sets(*items):
 
 
 CATALOGUE = Catalogue(
-    tuple(SimpleNamespace(label=label, modes_count=3 * (label in "uv")) for label in "abuv"), {}, CausePrior()
+    tuple(SimpleNamespace(label=label, cause_kind="vibration" if label in "uv" else "linear") for label in "abuv"),
+    {},
+    CausePrior(),
 )
 SETS = (
     (("a",), None, 20.0),
@@ -112,17 +115,18 @@ SETS = (
 
 
 def test_vibrations_are_fitted_in_their_best_company_where_one_is_plausible():
-    assert plausible_vibrations(sets(*SETS), CATALOGUE) == {"u": ("a",), "v": ("a",)}
-    assert plausible_vibrations(sets((("a",), None, 40.0), *SETS[1:]), CATALOGUE) == {}
+    assert plausible_vibrations(sets(*SETS), CATALOGUE)
+    assert companies(sets(*SETS), CATALOGUE.weighed_by_fits) == {"u": ("a",), "v": ("a",)}
+    assert not plausible_vibrations(sets((("a",), None, 40.0), *SETS[1:]), CATALOGUE)
 
 
 def test_the_best_set_to_fit_has_one_form_and_nothing_generic():
     found = sets((("a", "b"), None, 30.0), (("a",), "anything", 40.0), (("u",), None, 20.0))
-    assert [effect.label for effect in relinearise._best_known(found, CATALOGUE)[0]] == ["a", "b"]
-    assert relinearise._best_known(sets(*SETS[1:]), CATALOGUE) == ([], False)
+    assert relinearise._best_known(found, CATALOGUE) == ("a", "b")
+    assert relinearise._best_known(sets(*SETS[1:]), CATALOGUE) == ()
     jump = MassShift((1.0,))
     found = SetProbabilities.of([CauseSet((jump.label,), None, 9.0)], (jump.label,), (), CausePrior())
-    assert relinearise._best_known(found, replace(CATALOGUE, effects=(jump,))) == ([], False)
+    assert relinearise._best_known(found, replace(CATALOGUE, effects=(jump,))) == ()
 
 
 def test_a_fitted_vibration_gains_once_in_every_set():

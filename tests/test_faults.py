@@ -117,8 +117,8 @@ def test_spoilt_files_give_one_clear_error_or_are_accepted(change: Spoilt, study
 def test_what_the_robots_parser_prints_is_in_the_one_message(study: Path, tmp_path: Path, capfd) -> None:
     file = copy(study, tmp_path)
     robot = tmp_path / "robot.urdf"
-    robot.write_text(re.sub(r"<limit[^>]*/>", "", robot.read_text(), count=1))
-    with pytest.raises(InputError, match=r"robot.urdf: Pinocchio cannot read the robot: .*does not specify limits"):
+    robot.write_text(re.sub(r'lower="[^"]*"', 'lower="low"', robot.read_text(), count=1))
+    with pytest.raises(InputError, match=r"robot.urdf: Pinocchio cannot read the robot: .*lower value \(low\)"):
         load_model(Study.load(file))
     assert capfd.readouterr().err == ""
 

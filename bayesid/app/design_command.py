@@ -78,8 +78,8 @@ def run(
             write_json(folder / "design.json", {**content, "best": best.name})
             for motion in designs:
                 write_motion(motion, folder / f"{motion.name}.csv")
-            effort_options = {"starts": starts, "iterations": iterations, "thorough": thorough}
-            origin = report_origin(study, "design", seed, output=output, **effort_options, separate=separate)
+            effort_words = (("starts", starts), ("iterations", iterations), ("thorough", thorough))
+            origin = report_origin(study, "design", seed, output=output, **dict(effort_words), separate=separate)
             design_report(designs, best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
     yield from design_sentences(designs, best)
