@@ -83,9 +83,10 @@ def rounded(values, rng):
 def test_what_a_diagnosis_measures_a_study_states(label, spoil, planar_case):
     whole, rng = planar_case.posterior, np.random.default_rng(3)
     manoeuvres = garbled(whole, lambda values: spoil(values, rng))
-    fit = PerturbedModel(Posterior.of(whole.model, manoeuvres, step=whole.step)).fit()
+    perturbed, fault = PerturbedModel(Posterior.of(whole.model, manoeuvres, step=whole.step)), noise_faults()[label]
+    fit = perturbed.fit()
     assert noise_tests(FitResidual(fit))[label] < SUSPECT
-    study = stated(noise_faults()[label].measured(fit).statement)
+    study = stated(fault.refined(fault.measured(fit), perturbed, fit).statement)
     model = with_stated_noise(study, whole.model)
     kept = without_stated_faults(study, model, manoeuvres)
     again = PerturbedModel(Posterior.of(model, kept, step=whole.step)).fit()

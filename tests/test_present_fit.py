@@ -121,7 +121,7 @@ def test_a_large_unrecorded_wheel_is_named(spun):
     names = ("wheel-history:x", "wheel-history:y", "wheel-history:z", "rotational-drag", "rate-scale")
     effects = [create(name, end=END) if "wheel" in name else create(name) for name in names]
     found = diagnose(model, manoeuvres, 1, effects=[effect.attach(model.robot) for effect in effects])
-    assert found.held
+    assert found.bodies_fixed
     assert found.to_dict()["bodies_held"]
     assert found.verdict.status is Status.EXPLAINED
     assert found.verdict.causes == ("wheel-history:z",)
