@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg as sla
 
 from bayesid._math.arrays import Floats, log_sum
+from bayesid._math.least_squares import levenberg_marquardt
 
 __all__ = ["MissingBody", "outer_moments", "rigid_moments"]
 
-ITERATIONS = 60  # steps of the search for the mode
+ROUNDING = 1e-14  # smallest eigenvalue of an information on scaled moments, relative to the largest
+TOLERANCE = 1e-8  # of the search for the mode
 STEP = 1e-6  # of the derivative of the moments, relative to the prior's widths
 PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # a symmetric matrix in the order of the ten moments
 
@@ -137,25 +138,21 @@ class _SizedBody:
 
     def log_evidence(self, x: Floats, matrix: Floats, score: Floats) -> float:
         """Return the log evidence about the mode that a Levenberg-Marquardt search reaches from a point."""
+        length = np.sqrt(np.diag(matrix))
+        length[length == 0.0] = 1.0
+        values, vectors = np.linalg.eigh(matrix / np.outer(length, length))
+        seen = values > ROUNDING * values[-1]
+        whitening = vectors[:, seen].T / np.sqrt(values[seen])[:, None]
+        pull = whitening @ (score / length)
+        root = (values[seen][:, None] * whitening) * length
 
-        def cost(x: Floats) -> float:
-            a = self.amplitudes(x)
-            return float(score @ a + 0.5 * a @ matrix @ a + 0.5 * x @ x)
+        def residual(x: Floats) -> Floats:
+            return np.concatenate([root @ self.amplitudes(x) + pull, x])
 
-        damping, least = 1e-2, cost(x)
-        for _ in range(ITERATIONS):
-            slope = self.slope(x)
-            hessian = slope.T @ matrix @ slope + np.eye(len(x))
-            gradient = slope.T @ (score + matrix @ self.amplitudes(x)) + x
-            step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
-            trial = cost(x + step)
-            if np.isfinite(trial) and trial <= least:
-                x, damping, gain, least = x + step, 0.2 * damping, least - trial, trial
-                if gain < 1e-4:
-                    break
-            else:
-                damping *= 8.0
-                if damping > 1e9:
-                    break
+        def derivative(x: Floats) -> Floats:
+            return np.concatenate([root @ self.slope(x), np.eye(len(x))])
+
+        mode = levenberg_marquardt(residual, derivative, x, TOLERANCE)
+        least, x = float(mode.cost - 0.5 * pull @ pull), mode.x
         slope = self.slope(x)
         return -least - 0.5 * float(np.linalg.slogdet(slope.T @ matrix @ slope + np.eye(len(x)))[1])
