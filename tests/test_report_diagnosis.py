@@ -60,6 +60,7 @@ from bayesid.simulation.sensors import SensorKind
 from tests.conftest import POINT, SIGMA
 from tests.pdf_text import PdfText
 
+NAMING = (Status.EXPLAINED, Status.PARTLY_EXPLAINED, Status.AMBIGUOUS)
 BIAS = 4e-5
 HIDDEN = ["accel-bias", "accel-drift", "rate-bias", "wheel-momentum", "thruster-leak"]
 ALTERNATIVES = (("rate-bias", "wheel-momentum"), (), ("unknown",))
@@ -93,7 +94,7 @@ def clean(planar_case):
 
 def judged(result, status: Status, *others: tuple[str, ...], **same: tuple[str, ...]):
     """A diagnosis with another verdict on the same probabilities; ``same`` are equivalents, dashes as underscores."""
-    named = status in (Status.EXPLAINED, Status.AMBIGUOUS)
+    named = status in NAMING
     equivalent = {cause.replace("_", "-"): names for cause, names in same.items()}
     verdict = ProbableVerdict(status, ("accel-bias",) if named else (), equivalent, others)
     return replace(result, sensitivity=replace(result.sensitivity, verdict=verdict))
@@ -159,8 +160,8 @@ def test_sentences_name_the_cause_its_probability_its_size_and_what_it_gains(bia
 @pytest.mark.parametrize("status", list(Status))
 def test_every_status_is_said_with_its_gain_and_its_test(biased, clean, status):
     result = judged(clean if status is Status.ADEQUATE else biased, status)
-    assert sentences.verdict_sentence(result).lower().startswith(status.value)
-    named = status in (Status.EXPLAINED, Status.AMBIGUOUS)
+    assert sentences.verdict_sentence(result).lower().startswith(status.value.replace("-", " "))
+    named = status in NAMING
     before, after = result.gain.before, result.gain.after
     gain, alarm = sentences.gain_sentence(result), sentences.alarm_sentence(result)
     assert f"{before.chi2_per_sample:.3f}" in gain
@@ -745,6 +746,7 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
         result = {
             Status.EXPLAINED: lambda: judged(biased, Status.EXPLAINED),
             Status.ADEQUATE: lambda: judged(clean, Status.ADEQUATE),
+            Status.PARTLY_EXPLAINED: lambda: judged(biased, Status.PARTLY_EXPLAINED),
             Status.AMBIGUOUS: lambda: judged(biased, Status.AMBIGUOUS, *ALTERNATIVES),
             Status.UNKNOWN: lambda: replace(
                 judged(biased, Status.UNKNOWN), disturbance=disturbance, unexplained=disturbance

@@ -13,7 +13,13 @@ from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import Status, classes_of_equivalents, probable_verdict, verdict_sensitivity
+from bayesid.diagnosis.evidence.verdict import (
+    Rest,
+    Status,
+    classes_of_equivalents,
+    probable_verdict,
+    verdict_sensitivity,
+)
 from tests.gram_problem import LinearProblem
 
 LOW, HIGH = 0.02, 5.0
@@ -256,6 +262,7 @@ def stated(shares: dict[tuple[str, ...], float]) -> SetProbabilities:
 
 CLASSES = (("a", "a'"), ("b",), ("c",), ("d",), ("e",), ("f",))
 NOTHING: tuple[str, ...] = ()
+PARTLY = Status.PARTLY_EXPLAINED
 SPREAD = {("e",): 0.02, ("f",): 0.02, ("b", "e"): 0.02, ("b", "f"): 0.02}
 
 
@@ -266,7 +273,13 @@ SPREAD = {("e",): 0.02, ("f",): 0.02, ("b", "e"): 0.02, ("b", "f"): 0.02}
         ({("b",): 0.6, ("b", "c"): 0.2, ("b", "d"): 0.12, ("e",): 0.08}, Status.EXPLAINED, ("b",), ()),
         ({("b", "c"): 0.93, ("b",): 0.07}, Status.EXPLAINED, ("b", "c"), ()),
         ({("a",): 0.5, ("a'",): 0.42, ("c",): 0.08}, Status.EXPLAINED, ("a",), ()),
-        ({("b",): 0.55, ("b", "generic"): 0.4, ("c",): 0.05}, Status.EXPLAINED, ("b",), ()),
+        ({("b",): 0.86, ("b", "generic"): 0.09, ("c",): 0.05}, Status.EXPLAINED, ("b",), ()),
+        ({("b",): 0.85, ("b", "generic"): 0.1, ("c",): 0.05}, PARTLY, ("b",), ()),
+        ({("b",): 0.55, ("b", "generic"): 0.4, ("c",): 0.05}, PARTLY, ("b",), ()),
+        ({("b", "c"): 0.2, ("b", "generic"): 0.6, ("b",): 0.2}, PARTLY, ("b",), ()),
+        ({("b", "c", "generic"): 0.91, ("generic",): 0.09}, PARTLY, ("b", "c"), ()),
+        ({("b", "generic"): 0.89, ("generic",): 0.11}, Status.UNKNOWN, (), ()),
+        ({("b", name): 0.2 for name in "acdef"}, PARTLY, ("b",), ()),
         ({("b",): 0.5, ("c",): 0.42, **SPREAD}, Status.AMBIGUOUS, ("b",), (("c",),)),
         ({("b", "c"): 0.6, ("b",): 0.4}, Status.AMBIGUOUS, ("b", "c"), (("b",),)),
         ({("b", "c"): 0.5, ("b", "d"): 0.5}, Status.AMBIGUOUS, ("b", "c"), (("b", "d"),)),
@@ -277,7 +290,7 @@ SPREAD = {("e",): 0.02, ("f",): 0.02, ("b", "e"): 0.02, ("b", "f"): 0.02}
         ({("b",): 0.3, ("c",): 0.29, ("d",): 0.27, ("e",): 0.07, ("f",): 0.07}, Status.UNRESOLVED, (), ()),
         ({NOTHING: 0.6, ("b",): 0.4}, Status.UNRESOLVED, (), ()),
         ({("generic",): 0.6, ("b",): 0.4}, Status.UNKNOWN, (), ()),
-        ({("b", "generic"): 0.99, ("b",): 0.01}, Status.UNKNOWN, (), ()),
+        ({("b", "generic"): 0.99, ("b",): 0.01}, PARTLY, ("b",), ()),
     ],
 )
 def test_verdict_follows_the_contract(shares, status, causes, others):
@@ -288,6 +301,24 @@ def test_verdict_follows_the_contract(shares, status, causes, others):
         {"a": ("a'",)} if any("a" in item for item in (causes, *found.ambiguous_with)) else {}
     )
     assert probable_verdict(stated(shares), CLASSES, silent=True).status is Status.ADEQUATE
+
+
+@pytest.mark.parametrize(
+    ("shares", "probability", "rest"),
+    [
+        ({("b",): 0.95, ("b", "generic"): 0.05}, 0.05, Rest.NONE),
+        ({("b",): 0.9, ("b", "generic"): 0.1}, 0.1, Rest.UNDECIDED),
+        ({("b",): 0.5, ("b", "generic"): 0.5}, 0.5, Rest.UNDECIDED),
+        ({("b",): 0.49, ("b", "generic"): 0.51}, 0.51, Rest.PRESENT),
+        ({("b", name): 0.2 for name in "acdef"}, 1.0, Rest.PRESENT),
+        ({("b",): 0.6, ("generic",): 0.4}, 0.4, Rest.UNDECIDED),
+    ],
+)
+def test_the_remainder_is_said_apart_from_the_causes(shares, probability, rest):
+    found = probable_verdict(stated(shares), CLASSES, silent=False).remainder
+    assert found.verdict is rest
+    assert found.probability == pytest.approx(probability)
+    assert probable_verdict(stated(shares), CLASSES, silent=True).remainder.verdict is Rest.NONE
 
 
 def test_verdict_that_rests_on_the_prior_says_so_and_a_clear_one_does_not():
@@ -309,8 +340,10 @@ def test_verdict_that_rests_on_the_prior_says_so_and_a_clear_one_does_not():
         )
     assert sensitivities[3.0].verdict.status is Status.EXPLAINED
     assert sensitivities[3.0].verdict.causes == ("cause 2",)
-    assert sensitivities[3.0].changes == ()
+    # at 0.05 to 0.1 for the only generic candidate, twice its prior leaves open whether something remains
+    assert sensitivities[3.0].changes == ("unknown twice as probable",)
     assert len(sensitivities[3.0].others) == 6
+    assert {other.causes for other in sensitivities[3.0].others.values()} == {("cause 2",)}
     assert "causes twice as probable" in sensitivities[0.62].changes
 
 

@@ -236,12 +236,14 @@ class Review:
     causes: tuple[str, ...]  #: causes that the verdict names
     trusted: bool  #: whether the model may be right, so that it makes sense to identify it further
     probabilities: Mapping[str, float]  #: probability of every cause of the catalogue, and of ``"unknown"``
+    remainder: str = "none"  #: whether something unnamed acts beside the causes: ``none``, ``undecided``, ``present``
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of loop.json."""
         return {
             "status": self.status,
             "causes": list(self.causes),
+            "remainder": self.remainder,
             "trusted": self.trusted,
             "probabilities": dict(self.probabilities),
         }

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from bayesid._io.progress import PhaseClock, Progress, silent
 from bayesid.diagnosis.candidates.cause_kind import candidates
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
-from bayesid.diagnosis.evidence.verdict import Status, verdict_sensitivity
+from bayesid.diagnosis.evidence.verdict import Rest, Status, verdict_sensitivity
 from bayesid.diagnosis.outcome.candidate_table import candidate_table
 from bayesid.diagnosis.outcome.disturbance import disturbing_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain
@@ -122,9 +122,10 @@ def diagnose(
     gain = measure_gain(before, after, executor)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
+    remains = verdict.remainder.verdict is Rest.PRESENT
     lacking = Hypothesis(perturbed, without_torque(search.base.fit)) if present.held else before
     disturbance = disturbing_wrench(lacking, search.base.bank, open_question, settings)
-    unexplained = disturbing_wrench(after, search.under(named).point.bank, False) if named else disturbance
+    unexplained = disturbing_wrench(after, search.under(named).point.bank, remains, settings) if named else disturbance
     table = candidate_table(search, catalogue, rng)
     torques: TorqueReading | TorquesNotRead | None = None
     if whole.torque is not None:

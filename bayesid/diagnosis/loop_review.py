@@ -65,4 +65,5 @@ class DiagnosisReview:
             tuple(result.verdict.causes),
             result.alarm.silent or probabilities.nothing >= self.settings.trusted_from,
             {**probabilities.inclusion, "unknown": probabilities.unknown},
+            result.remainder.verdict.value,
         )

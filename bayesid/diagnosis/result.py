@@ -10,7 +10,7 @@ from typing import Any
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, VerdictSensitivity
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Remainder, Status, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others, instants_of
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
@@ -96,6 +96,11 @@ class Diagnosis:
         return self.sensitivity.verdict
 
     @property
+    def remainder(self) -> Remainder:
+        """Whether something acts beside the named causes, and how probable that is."""
+        return self.verdict.remainder
+
+    @property
     def probabilities(self) -> SetProbabilities:
         """Probabilities of all sets."""
         return self.search.probabilities
@@ -169,13 +174,6 @@ class Diagnosis:
         sized = {effect.label for effect in self.effects if effect.parameters}
         pair = [name for name in names if name in sized][:2]
         return (pair[0], pair[1]) if len(pair) == 2 else None
-
-    @property
-    def likely_causes(self) -> tuple[str, ...]:
-        """Causes probable enough to be named, the most probable of each class; not all may be named."""
-        inclusion = self.probabilities.inclusion
-        likely = [members for members in self.classes if self.probabilities.of_any(members) >= self.settings.named_from]
-        return tuple(max(members, key=lambda name: inclusion[name]) for members in likely)
 
     @property
     def unseen_candidates(self) -> tuple[Candidate, ...]:
@@ -269,6 +267,7 @@ class Diagnosis:
         return {
             "status": verdict.status.value,
             "causes": [name for name in verdict.causes if name in probabilities.causes],
+            "remainder": {"probability": self.remainder.probability, "verdict": self.remainder.verdict.value},
             "equivalent_to": {cause: list(names) for cause, names in verdict.equivalent_to.items()},
             "ambiguous_with": [list(names) for names in verdict.ambiguous_with],
             "probability": {

@@ -29,7 +29,10 @@ class DiagnosisSettings:
     most_alternatives : int
         Alternatives that are named; where more are needed, none is, since a longer list decides nothing.
     unknown_from : float
-        Probability of something generic above which the verdict is unknown: the majority.
+        Probability of something generic above which it is present: the majority.
+    remainder_from : float
+        Probability of something generic from which the named causes explain the data only partly: what `named_from`
+        leaves to all that is not named.
     visible_information : float
         Information on amplitudes at the bound of their scale, in the most visible direction, from which on the data see
         a difference between two causes: one, where posterior and prior are equally wide.
@@ -87,6 +90,7 @@ class DiagnosisSettings:
     covered: float = 0.95
     most_alternatives: int = 4
     unknown_from: float = 0.5
+    remainder_from: float = 0.1
     visible_information: float = 1.0
     suspect_p_value: float = 1e-3
     fault_far_behind: float = 10.0
@@ -122,6 +126,7 @@ _PROBABILITIES = {
     "named_from",
     "covered",
     "unknown_from",
+    "remainder_from",
     "suspect_p_value",
     "event_level",
     "matters",

@@ -153,6 +153,8 @@ def ending_sentence(history: History) -> str:
     if history.status == "wrong-model":
         review = history.steps[-1]["diagnosis"]
         cause = joined(review["causes"]) if review["causes"] else "something that no cause of the catalogue explains"
+        if review["causes"] and review.get("remainder") == "present":
+            cause += " and something beside that is not named"
         return f"The model is wrong: after {flown} the recordings show {cause}. The loop stops."
     if history.status == "reached":
         return f"All that is wanted is reached after {flown}."

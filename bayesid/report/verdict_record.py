@@ -53,11 +53,12 @@ def shipped_record() -> dict[str, Share]:
 def record_sentence(status: Status) -> str | None:
     """Return how often verdicts of a status were right in the trials, None where there was no such verdict."""
     record = shipped_record()
-    share = record[status.value]
-    if not share.total:
+    share = record.get(status.value)
+    if share is None or not share.total:
         return None
     said = {
         Status.EXPLAINED: f"of the verdicts that explained the data, {share} named nothing but what was hidden",
+        Status.PARTLY_EXPLAINED: f"of the verdicts that explained a part, {share} named nothing but what was hidden",
         Status.AMBIGUOUS: f"of the ambiguous verdicts, {share} held what was hidden among their alternatives",
         Status.UNKNOWN: f"of the verdicts of something unknown, {share} met something outside the catalogue",
         Status.UNRESOLVED: f"of the unresolved verdicts, {share} met something hidden",

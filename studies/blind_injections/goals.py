@@ -10,7 +10,7 @@ from scipy import stats
 
 from bayesid.diagnosis import Status
 from bayesid.report.verdict_record import Share
-from studies.blind_injections.trials import CASES, Trial
+from studies.blind_injections.trials import CASES, EXPLAINING, Trial
 from studies.common.study import Goal, Verdict
 from studies.truth.basilisk.cases import BasiliskCase
 
@@ -46,7 +46,7 @@ def barely_left(trials: Sequence[Trial]) -> list[Trial]:
 
 def wrongly_explained(trial: Trial) -> bool:
     """Return whether causes are said to explain the data that are not what is hidden."""
-    return trial.status == "explained" and not trial.holds
+    return trial.status in EXPLAINING and not trial.holds
 
 
 def goals_of(trials: Sequence[Trial]) -> list[Goal]:
@@ -138,7 +138,7 @@ def _stated(text: str, trials: Sequence[Trial]) -> Goal:
     if not trials:
         return Goal(text, "none", Verdict.NOT_TESTED)
     share = Share(sum(map(wrongly_explained, trials)), len(trials))
-    errors = [1.0 - t.probability for t in trials if t.status == "explained" and t.probability is not None]
+    errors = [1.0 - t.probability for t in trials if t.status in EXPLAINING and t.probability is not None]
     reached = share_text(share.count, share.total)
     if not errors:
         return Goal(text, f"{reached}, nothing stated", Verdict.OPEN)
@@ -178,6 +178,7 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
 # when a verdict of each status counts as right
 RIGHT: dict[Status, Callable[[Trial], bool]] = {
     Status.EXPLAINED: lambda trial: trial.holds,
+    Status.PARTLY_EXPLAINED: lambda trial: trial.holds,
     Status.AMBIGUOUS: lambda trial: trial.in_set,
     Status.UNKNOWN: lambda trial: trial.kind == "unknown",
     Status.UNRESOLVED: lambda trial: trial.kind != "adequate",

@@ -31,6 +31,8 @@ from studies.truth.mujoco import Study as Written
 # fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect
 WEAKER = 0.1
 
+EXPLAINING = ("explained", "partly-explained")  # statuses in which causes are named without rivals
+
 MATTERS = 0.01  # probability above which a cause is kept with its trial
 WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)  # least and largest strength of causes of the catalogue and of others
 
@@ -109,7 +111,7 @@ class Trial:
     @property
     def named_rightly(self) -> bool:
         """True if the hidden set is the one named."""
-        return self.status == "explained" and self._right(self.causes)
+        return self.status in EXPLAINING and self._right(self.causes)
 
     @property
     def holds(self) -> bool:
@@ -119,12 +121,12 @@ class Trial:
     @property
     def in_set(self) -> bool:
         """True if the hidden set is among those reported."""
-        return self.status in ("explained", "ambiguous") and any(self._right(labels) for labels in self.sets)
+        return self.status in (*EXPLAINING, "ambiguous") and any(self._right(labels) for labels in self.sets)
 
     @property
     def misnamed(self) -> bool:
         """True if causes are named, but the hidden set is neither named nor among the other explanations."""
-        return self.status in ("explained", "ambiguous") and not self.in_set
+        return self.status in (*EXPLAINING, "ambiguous") and not self.in_set
 
     def _right(self, labels: Sequence[str]) -> bool:
         names = set(self.hidden) | set(self.accept)

@@ -21,6 +21,8 @@ from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 __all__ = [
     "UNKNOWN",
     "ProbableVerdict",
+    "Remainder",
+    "Rest",
     "Status",
     "VerdictSensitivity",
     "classes_of_equivalents",
@@ -40,9 +42,48 @@ class Status(Enum):
 
     ADEQUATE = "adequate"
     EXPLAINED = "explained"
+    PARTLY_EXPLAINED = "partly-explained"
     AMBIGUOUS = "ambiguous"
     UNRESOLVED = "unresolved"
     UNKNOWN = "unknown"
+
+
+class Rest(Enum):
+    """Whether something unnamed acts beside the named causes."""
+
+    NONE = "none"
+    UNDECIDED = "undecided"
+    PRESENT = "present"
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What acts beside the named causes, a statement of its own.
+
+    Attributes
+    ----------
+    probability : float
+        Probability that something without a name is at work. Where a cause is sure and those beside it are not, that
+        anything beside it is.
+    verdict : Rest
+        None below `DiagnosisSettings.remainder_from`, present above `DiagnosisSettings.unknown_from`.
+    """
+
+    probability: float = 0.0
+    verdict: Rest = Rest.NONE
+
+    @staticmethod
+    def of(probability: float, settings: DiagnosisSettings = DEFAULT_SETTINGS) -> Remainder:
+        """Return the remainder of a probability.
+
+        Parameters
+        ----------
+        probability : float
+        settings : DiagnosisSettings, optional
+        """
+        if probability < settings.remainder_from:
+            return Remainder(probability, Rest.NONE)
+        return Remainder(probability, Rest.PRESENT if probability > settings.unknown_from else Rest.UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -53,18 +94,21 @@ class ProbableVerdict:
     ----------
     status : Status
     causes : tuple of str
-        Best set of causes, one for each class, the most probable first; empty unless explained or ambiguous.
+        Best set of causes, one for each class, the most probable first; empty where adequate, unresolved or unknown.
     equivalent_to : dict of str to tuple of str
         Other names for the same change of the model, by cause; only causes that have any.
     ambiguous_with : tuple of tuples of str
         Other alternatives, the most probable first. An empty one says that nothing may be lacking, and the name
         "unknown" stands for any generic candidate.
+    remainder : Remainder
+        Whether something acts beside the named causes.
     """
 
     status: Status
     causes: tuple[str, ...] = ()
     equivalent_to: dict[str, tuple[str, ...]] = field(default_factory=dict)
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
+    remainder: Remainder = Remainder()
 
 
 def probable_verdict(
@@ -78,9 +122,12 @@ def probable_verdict(
     Sets are first merged: equivalent causes count as one class, and all generic candidates as one more, the unknown.
 
     - adequate: the alarm is silent.
-    - unknown: generic candidates hold the majority.
-    - explained: every class of the best set has a probability of 0.9 or more, whatever accompanies it. The best set is
-      the most probable one without anything generic.
+    - explained: every class of the best set has a probability of 0.9 or more, whatever accompanies it, and something
+      generic has less than 0.1. The best set is the most probable one without anything generic, or, where generic
+      candidates hold the majority and may imitate a part of it, the classes that have 0.9.
+    - partly-explained: the same, and something generic has more: what remains is undecided up to 0.5, then present.
+      Also where classes of 0.9 stand beside causes that are too many to name.
+    - unknown: generic candidates hold the majority, and no class has 0.9.
     - ambiguous: two to four alternatives hold 0.95. They are merged sets, taken in the order of their probability; each
       holds whatever includes it, so that the many improbable companions of a cause count for it and not against it, and
       what an earlier one holds is no alternative of its own. Nothing and the unknown may be among them.
@@ -97,31 +144,59 @@ def probable_verdict(
         With the thresholds, of which the defaults are named above.
     """
     if silent:
-        return ProbableVerdict(Status.ADEQUATE)
-    if probabilities.unknown > settings.unknown_from:
-        return ProbableVerdict(Status.UNKNOWN)
+        return ProbableVerdict(Status.ADEQUATE, remainder=Remainder(probabilities.unknown))
     merged = _merged(probabilities, classes)
-    alternatives = _alternatives(merged, settings.covered)
-    best = next(alternative for alternative in merged if UNKNOWN not in alternative)
+    at_work = _at_work(merged, classes)
+    certain = frozenset(key for key, probability in at_work.items() if probability >= settings.named_from)
+    remainder = Remainder.of(probabilities.unknown, settings)
+    best = next((names for names in merged if UNKNOWN not in names), frozenset[str]())
+    named, others = best if best <= certain else frozenset[str](), list[frozenset[str]]()
+    if remainder.verdict is Rest.PRESENT:
+        named, status = certain, Status.PARTLY_EXPLAINED if certain else Status.UNKNOWN
+    elif named:
+        status = Status.EXPLAINED if remainder.verdict is Rest.NONE else Status.PARTLY_EXPLAINED
+    else:
+        alternatives = _alternatives(merged, settings.covered)
+        if best and 2 <= len(alternatives) <= settings.most_alternatives:
+            named, status = best, Status.AMBIGUOUS
+            others = [alternative for alternative in alternatives if alternative != best]
+        elif certain:
+            beside = 1.0 - sum(probability for causes, probability in merged.items() if causes <= certain)
+            named, status, remainder = certain, Status.PARTLY_EXPLAINED, Remainder.of(beside, settings)
+        else:
+            status = Status.UNRESOLVED
+    causes, *alternatives_said = (_said(names, at_work, probabilities, classes) for names in (named, *others))
+    mentioned = set(causes).union(*alternatives_said)
+    ordered = (_ordered(members, probabilities) for members in classes)
+    equivalent = {first: tuple(same) for first, *same in ordered if same and first in mentioned}
+    return ProbableVerdict(status, causes, equivalent, tuple(alternatives_said), remainder)
+
+
+def _ordered(members: Sequence[str], probabilities: SetProbabilities) -> list[str]:
+    """Return the members of a class, the most probable first."""
     inclusion = probabilities.inclusion
-    ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
-    names = {members[0]: ordered[index] for index, members in enumerate(map(sorted, classes))}
-    at_work = dict.fromkeys(names, 0.0)
+    return sorted(members, key=lambda name: (-inclusion[name], name))
+
+
+def _said(
+    alternative: frozenset[str],
+    at_work: Mapping[str, float],
+    probabilities: SetProbabilities,
+    classes: Sequence[Sequence[str]],
+) -> tuple[str, ...]:
+    """Return an alternative by the most probable name of each of its classes, the most probable class first."""
+    names = {min(members): members for members in classes}
+    known = sorted(alternative - {UNKNOWN}, key=lambda key: (-at_work[key], key))
+    return (*(_ordered(names[key], probabilities)[0] for key in known), *(alternative & {UNKNOWN}))
+
+
+def _at_work(merged: Mapping[frozenset[str], float], classes: Sequence[Sequence[str]]) -> dict[str, float]:
+    """Return the probability of each class, by its first name, whatever accompanies it."""
+    total = {min(members): 0.0 for members in classes}
     for alternative, probability in merged.items():
         for key in alternative - {UNKNOWN}:
-            at_work[key] += probability
-
-    def named(alternative: frozenset[str]) -> tuple[str, ...]:
-        known = sorted(alternative - {UNKNOWN}, key=lambda key: (-at_work[key], key))
-        return (*(names[key][0] for key in known), *(alternative & {UNKNOWN}))
-
-    explained = bool(best) and all(at_work[key] >= settings.named_from for key in best)
-    if not explained and (not best or not 2 <= len(alternatives) <= settings.most_alternatives):
-        return ProbableVerdict(Status.UNRESOLVED)
-    others = () if explained else tuple(named(alternative) for alternative in alternatives if alternative != best)
-    mentioned = set(named(best)).union(*others)
-    equivalent = {members[0]: tuple(members[1:]) for members in ordered if len(members) > 1 and members[0] in mentioned}
-    return ProbableVerdict(Status.EXPLAINED if explained else Status.AMBIGUOUS, named(best), equivalent, others)
+            total[key] += probability
+    return total
 
 
 def _merged(probabilities: SetProbabilities, classes: Sequence[Sequence[str]]) -> dict[frozenset[str], float]:

@@ -24,7 +24,7 @@ from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, probable_verdict
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Rest, Status, probable_verdict
 from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.mode import fit
@@ -119,7 +119,8 @@ def torques_beside(
     hypothesis, model, prior, rng, bounds, settings : as for `read_torques`
     """
     nameless = any(UNKNOWN in names for names in verdict.ambiguous_with)
-    if nameless or verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
+    open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
+    if nameless or open_question or verdict.remainder.verdict is Rest.PRESENT:
         return TorquesNotRead("The motion shows something that has no name, and torques depend on the motion.")
     try:
         return read_torques(hypothesis, model, prior, rng, bounds, settings)

@@ -73,7 +73,7 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
         ("Alternative", f"{set_text(names)}, probability {format_probability(result.probability_of(names))}")
         for names in verdict.ambiguous_with
     ]
-    if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
+    if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         entries.append(("What is left", wrench_sentence(result.unexplained)))
     if result.torques is not None:
         entries.append(("Joint torques", torque_sentence(result.torques)))

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bayesid._io.words import joined
-from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status, TorqueReading, TorquesNotRead
+from bayesid.diagnosis import (
+    Diagnosis,
+    DisturbingWrench,
+    Frame,
+    Hypothesis,
+    Rest,
+    Status,
+    TorqueReading,
+    TorquesNotRead,
+)
 from bayesid.diagnosis.candidates.cause_kind import cause_kinds
 from bayesid.diagnosis.evidence.verdict import UNKNOWN
 from bayesid.diagnosis.noise import noise_faults
@@ -34,6 +43,7 @@ __all__ = [
     "cause_summary",
     "diagnosis_sentences",
     "gain_sentence",
+    "remainder_sentence",
     "torque_sentence",
     "torque_size",
     "verdict_sentence",
@@ -41,7 +51,6 @@ __all__ = [
 ]
 
 AT_MOST = 6  # largest number of quantities of one cause in a sentence
-WORTH_SAYING = 0.1  # probability of something without a name from which it is said beside causes that are named
 SHOWN_SETS = 3  # sets named in the sentence of a verdict that names none
 
 FIXED = {
@@ -69,7 +78,7 @@ def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
     yield from cause_sentences(result)
     yield from alternative_sentences(result)
     yield gain_sentence(result)
-    if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
+    if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         yield wrench_sentence(result.unexplained)
     if result.torques is not None:
         yield torque_sentence(result.torques)
@@ -82,18 +91,10 @@ def verdict_sentence(result: Diagnosis) -> str:
         case Status.ADEQUATE:
             return "Adequate: the simulation leaves nothing but the declared noise."
         case Status.EXPLAINED:
-            one = len(result.verdict.causes) == 1
-            unknown = result.probabilities.unknown
-            beside = (
-                "needs no other explanation."
-                if unknown < WORTH_SAYING
-                else f"may still lack something without a name ({probability_text(unknown)})."
-            )
-            return (
-                f"Explained by {causes}: with {'it' if one else 'them'} the simulation {beside} "
-                f"The probability that {'it is' if one else 'all are'} at work is "
-                f"{_is(result.probability_of(result.verdict.causes))}."
-            )
+            beside = f"with {_them(result)} the simulation needs no other explanation."
+            return f"Explained by {causes}: {beside} {_together(result)} {remainder_sentence(result)}"
+        case Status.PARTLY_EXPLAINED:
+            return f"Partly explained by {causes}. {_together(result)} {remainder_sentence(result)}"
         case Status.AMBIGUOUS:
             names = "; or ".join(map(set_text, result.alternatives))
             return (
@@ -116,21 +117,28 @@ def verdict_sentence(result: Diagnosis) -> str:
     return (
         "Unknown: what the simulation leaves belongs most probably to no cause of the catalogue "
         f"({probability_text(result.probabilities.unknown)}). Of what names no cause, the most probable is: {generic}."
-        f"{_nearly_certain(result)}"
     )
 
 
-def _nearly_certain(result: Diagnosis) -> str:
-    """Return a sentence on causes that would be named if they left nothing without a name, or nothing."""
-    certain = result.likely_causes
-    if not certain:
-        return ""
-    one = len(certain) == 1
-    return (
-        f" Beside it {'the cause' if one else 'the causes'} {joined(certain)} {'has' if one else 'have'} a probability "
-        f"of {format_percent(result.settings.named_from, 2)} or more {'and is' if one else 'each and are'} not named, "
-        "since what has no name may imitate a part of any cause."
-    )
+def remainder_sentence(result: Diagnosis) -> str:
+    """Return whether something that is not named acts beside the named causes, with its probability."""
+    probability = probability_text(result.remainder.probability)
+    match result.remainder.verdict:
+        case Rest.NONE:
+            return f"Nothing without a name is seen beside {_them(result)} ({probability})."
+        case Rest.UNDECIDED:
+            return f"Whether something without a name acts beside {_them(result)} is undecided ({probability})."
+    return f"Something that is not named acts beside {_them(result)} ({probability})."
+
+
+def _them(result: Diagnosis) -> str:
+    return "it" if len(result.verdict.causes) == 1 else "them"
+
+
+def _together(result: Diagnosis) -> str:
+    """Return the probability that the named causes are at work."""
+    they = "it is" if len(result.verdict.causes) == 1 else "all are"
+    return f"The probability that {they} at work is {_is(result.probability_of(result.verdict.causes))}."
 
 
 def _is(value: float) -> str:
@@ -231,12 +239,13 @@ def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
                 "The joint torques leave nothing but the declared noise "
                 f"(p {relation(format_p_value(found.p_value))}, chi-square per sample {before})."
             )
-        case Status.EXPLAINED:
+        case Status.EXPLAINED | Status.PARTLY_EXPLAINED:
             rows = [row for row in found.causes if row.name in found.verdict.causes]
             sizes = joined([f"{row.name} ({torque_size(found, row.name)}, ± sd)" for row in rows])
+            partly = "partly " if found.verdict.status is Status.PARTLY_EXPLAINED else ""
             return (
-                f"The joint torques are explained by {sizes}; chi-square per sample goes from {before} to {after}. "
-                "It changes no motion, since that of the joints is measured."
+                f"The joint torques are {partly}explained by {sizes}; chi-square per sample goes from {before} to "
+                f"{after}. It changes no motion, since that of the joints is measured."
             )
         case Status.AMBIGUOUS:
             others = [found.verdict.causes, *found.verdict.ambiguous_with]
@@ -265,6 +274,10 @@ def action_sentence(result: Diagnosis) -> str:
             return "Use the model as it is."
         case Status.EXPLAINED:
             return _addition(result)
+        case Status.PARTLY_EXPLAINED:
+            if result.remainder.verdict is Rest.PRESENT:
+                return f"{_addition(result)} Something remains, so that they may be off. {SEPARATE_UNKNOWN}"
+            return f"{_addition(result)} Record more to decide whether anything remains."
         case Status.AMBIGUOUS:
             first = next(advice_sentences(result), "")
             return f"Do not rely on one of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()

@@ -96,7 +96,9 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         "the data cannot resolve and the physical bound is equally probable."
     )
     yield (
-        f"Causes are named where the class of each has a probability of {settings.named_from:g} or more. Otherwise the "
+        f"Causes are named where the class of each has a probability of {settings.named_from:g} or more; they explain "
+        f"the data where candidates that name nothing have less than {settings.remainder_from:g}, and else a part of "
+        "them. Otherwise the "
         f"verdict is ambiguous if two to {settings.most_alternatives} alternatives hold "
         f"{format_number(100.0 * settings.covered)} %, and unresolved if more are needed. It is unknown if candidates "
         "that name nothing hold the majority."
