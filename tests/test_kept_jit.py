@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bayesid._math.kept_jit import forget_executables, kept_jit
+from bayesid._math import kept_jit as module
+from bayesid._math.kept_jit import forget_executables, kept_jit, quick_jit
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
 from bayesid.simulation.sensors import SensorKind
@@ -167,3 +168,30 @@ def test_what_nobody_uses_is_removed_and_nothing_else(folder):
     assert file.is_file()
     assert users.is_file()
     assert not old.exists()
+
+
+def test_options_that_the_installed_xla_refuses_are_left_out(folder, monkeypatch):
+    monkeypatch.setattr(module, "QUICKLY", {**module.QUICKLY, "xla_of_another_version": True})
+    module.compiler_options.cache_clear()
+    try:
+        taken = module.compiler_options()
+        assert set(taken) < set(module.QUICKLY)
+        assert "xla_cpu_parallel_codegen_split_count" in taken, "all versions from 0.10 to 0.12 take it"
+        assert float(quick_jit(lambda x: 2.0 * x)(3.0)) == 6.0
+        assert float(scaled(10, X)) == 28.0
+    finally:
+        module.compiler_options.cache_clear()
+
+
+@pytest.mark.parametrize("library", ["jax", "jaxlib"])
+def test_an_executable_of_another_version_is_not_read(folder, monkeypatch, library: str):
+    scaled(10, X)
+    forget_executables()
+    monkeypatch.setattr(f"{library}.__version__", "0.10.1000")
+    module._surroundings.cache_clear()
+    try:
+        assert float(scaled(10, X)) == 28.0
+    finally:
+        module._surroundings.cache_clear()
+    assert TRACED == [10, 10]
+    assert len(kept(folder)) == 2

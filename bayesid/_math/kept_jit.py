@@ -12,6 +12,7 @@ import hashlib
 import os
 import pickle
 import platform
+import sys
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -23,16 +24,18 @@ from typing import Any, Protocol, runtime_checkable
 from weakref import WeakSet
 
 import jax
+import jaxlib
 from jax import monitoring
 from jax.api_util import shaped_abstractify
 from jax.core import Tracer
+from jax.errors import JaxRuntimeError
 from jax.experimental import serialize_executable
 from jax.stages import Compiled
 
 from bayesid._io.files import complete_file
 from bayesid._math.memory import give_back_memory
 
-__all__ = ["OBTAINED", "QUICKLY", "forget_executables", "kept_jit"]
+__all__ = ["OBTAINED", "forget_executables", "kept_jit", "quick_jit"]
 
 PACKAGE = __name__.partition(".")[0]
 OBTAINED = "/bayesid/executable"
@@ -49,6 +52,25 @@ QUICKLY = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split
 """Options of XLA: compilation takes two thirds of the time and a fifth less memory, and the code is as fast."""
 
 _known: WeakSet[_KeptJit] = WeakSet()
+
+
+@cache
+def compiler_options() -> dict[str, bool | int]:
+    """Return those of `QUICKLY` that the installed XLA takes for this device; each version has others."""
+
+    def is_taken(name: str) -> bool:
+        try:
+            jax.jit(lambda: 0.0).lower().compile(compiler_options={name: QUICKLY[name]})
+        except JaxRuntimeError:
+            return False
+        return True
+
+    return {name: value for name, value in QUICKLY.items() if is_taken(name)}
+
+
+def quick_jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function compiled as by `jax.jit`, in less time; it cannot be part of another compiled function."""
+    return jax.jit(function, compiler_options=compiler_options())
 
 
 @runtime_checkable
@@ -177,7 +199,7 @@ class _KeptJit:
     @staticmethod
     def _compiled(function: Any, args: tuple[Any, ...]) -> Compiled:
         """Compile for these arguments; the options of XLA stay out of `jax.jit`, which refuses them within another."""
-        executable: Compiled = function.lower(*args).compile(compiler_options=QUICKLY)
+        executable: Compiled = function.lower(*args).compile(compiler_options=compiler_options())
         return executable
 
     def _file(self, static: tuple[Any, ...], tree: Any, shapes: tuple[Any, ...]) -> Path | None:
@@ -238,8 +260,8 @@ def _surroundings() -> str:
     lines = processor.read_text().splitlines() if processor.is_file() else [platform.processor()]
     flags = [line for line in lines if line.startswith(("flags", "model name", "Features"))] or lines
     device = jax.devices()[0]
-    versions = (jax.__version__, jax.lib.__version__)
-    machine = (device.device_kind, os.cpu_count(), sorted(set(flags)))
+    versions = (jax.__version__, jaxlib.__version__, sys.version_info[:2])
+    machine = (device.platform, device.device_kind, os.cpu_count(), sorted(set(flags)))
     options = (os.environ.get("XLA_FLAGS"), _setting("jax_enable_x64"))
     return repr((digest.hexdigest(), versions, machine, options))
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.kept_jit import QUICKLY
+from bayesid._math.kept_jit import quick_jit
 from bayesid.design.criteria import Criterion
 from bayesid.design.encoder_information import Encoder, encoder_directions, likely_directions, position_noise
 from bayesid.design.flight import Flight, Outcome
@@ -345,7 +345,7 @@ class Problem:
             flight.prepare()
             return self._chosen(True, flight, index, information, prior)
 
-        return jax.jit(jax.value_and_grad(cost), compiler_options=QUICKLY)
+        return quick_jit(jax.value_and_grad(cost))
 
     @cached_property
     def _motion_cost(self):  # type: ignore[no-untyped-def]
@@ -356,7 +356,7 @@ class Problem:
             flight.prepare()
             return self._chosen(False, flight, index, jnp.zeros_like(prior), prior)
 
-        return jax.jit(jax.value_and_grad(cost), compiler_options=QUICKLY)
+        return quick_jit(jax.value_and_grad(cost))
 
     def _chosen(self, informed: bool, flight: Flight, index: Array, information: Array, prior: Array) -> Array:
         """Return the cost by one of the criteria that depend on the information, or of the others."""
@@ -383,9 +383,9 @@ class Problem:
 
             return values(*motion), jax.vmap(along, -1, -1)(*slopes)
 
-        return jax.jit(fractions, compiler_options=QUICKLY)
+        return quick_jit(fractions)
 
     @cached_property
     def _fine_trajectory(self):  # type: ignore[no-untyped-def]
         fine = replace(self.plan, step=self.plan.step / FINER)
-        return jax.jit(lambda parameters, z: Flight(fine, parameters, z).trajectory(), compiler_options=QUICKLY)
+        return quick_jit(lambda parameters, z: Flight(fine, parameters, z).trajectory())
