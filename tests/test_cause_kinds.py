@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from types import SimpleNamespace
 
 import numpy as np
@@ -55,6 +56,23 @@ def test_the_same_amplitudes_in_two_recordings_are_weighed_by_the_sum_of_their_i
     assert instant_cause._weighed(gram, group, [None, None], [1, 1]) == 0.0
     assert both > single > 0.0
     assert instant_cause._weighed(gram, group, [0, 0], [5, 7]) == pytest.approx(both - np.log(35.0))
+
+
+def test_all_choices_of_instants_share_their_part_of_the_prior():
+    samples = [3, 4, 2]
+    each = [
+        instant_cause._share(chosen, len(samples)) * np.prod(chosen)
+        for count in (1, 2, 3)
+        for chosen in combinations(samples, count)
+    ]
+    assert sum(each) == pytest.approx(instant_cause.SHARE)
+
+
+def test_a_time_that_may_be_anywhere_has_the_deviation_of_a_uniform_one():
+    times = np.arange(10.0, 17.0, 0.5)
+    mean, sd = instant_cause._mean_and_sd(np.full(len(times), 1.0 / len(times)), times, 0.5)
+    assert mean == pytest.approx(times.mean())
+    assert sd == pytest.approx(0.5 * len(times) / np.sqrt(12.0))
 
 
 class Point(SimpleNamespace):

@@ -21,6 +21,7 @@ from bayesid.simulation.effects import (
     SensorLatency,
     SensorScale,
     WheelMomentum,
+    create,
 )
 from bayesid.simulation.sensors import SensorKind
 
@@ -84,6 +85,37 @@ def test_each_part_of_a_push_alone_adds_up(planar_posterior: Callable[..., Poste
     np.testing.assert_allclose(np.sum(parts, axis=0), whole, atol=1e-12 * np.abs(whole).max())
     assert all(np.abs(part).max() > 0.0 for part in parts)
     assert linear.along(jax.tree.map(lambda x: x[:0], pushes)).shape == (0, *posterior.residual_shape)
+
+
+def test_columns_of_effects_are_derivatives_of_the_simulation_that_has_them(planar_posterior: Callable[..., Posterior]):
+    """Of a force, a table of the arm and an error of a sensor that is turned in the base."""
+    base = planar_posterior(np.random.default_rng(7), step=0.5)
+    turned = tuple(
+        replace(sensor, mounting=(0.1, -0.4, 0.2, 0.889)) if sensor.kind is SensorKind.ACCEL else sensor
+        for sensor in base.model.sensors
+    )
+    posterior = Posterior.of(replace(base.model, sensors=turned), base.manoeuvres, step=0.5)
+    names = ("thruster-leak", "link-inertia:link2", "accel-position")
+    effects = [create(name).attach(base.model.robot) for name in names]
+    perturbed, z, data = PerturbedModel(posterior), np.zeros(posterior.size), posterior.data.arrays
+    items = [(effect, np.zeros(len(effect.parameters))) for effect in effects]
+    columns = perturbed.columns(items, perturbed.operating(z, ()), z, data)
+    model = posterior.model
+    for effect in effects:
+        model = model.extend(effect)
+    extended = Posterior.of(model, base.manoeuvres, step=0.5)
+    steps = 1e-3 * np.eye(extended.size)[len(z) :]
+    sides = [np.stack([extended.residuals(sign * step).ravel() for step in steps]) for sign in (1.0, -1.0)]
+    expected = np.split((sides[0] - sides[1]).T / 2e-3, np.cumsum([own.shape[1] for own in columns])[:-1], axis=1)
+    for name, own, differences in zip(names, columns, expected, strict=True):
+        assert np.linalg.norm(own - differences) < 1e-3 * np.linalg.norm(differences), name
+
+
+def test_a_fit_ends_where_the_gradient_of_its_cost_vanishes(planar_posterior: Callable[..., Posterior]):
+    fit = PerturbedModel(planar_posterior(np.random.default_rng(9), step=0.5)).fit()
+    gradient = fit.own.T @ fit.residual + fit.own_coordinates
+    assert np.abs(fit.own_coordinates).max() > 0.1  # the prior pulls
+    assert gradient @ fit.covariance @ gradient < 1e-4
 
 
 def test_a_fit_without_finite_derivatives_has_no_evidence(monkeypatch):

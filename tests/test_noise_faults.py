@@ -93,6 +93,30 @@ def test_what_a_diagnosis_measures_a_study_states(label, spoil, planar_case):
     assert noise_tests(FitResidual(again)).get(label, 0.0) > SUSPECT
 
 
+def test_the_factor_on_a_sensor_s_noise_is_as_certain_as_a_root_of_chi_square(planar_case):
+    whole, rng = planar_case.posterior, np.random.default_rng(3)
+    manoeuvres = garbled(whole, lambda values: noisier(values, rng))
+    fit = PerturbedModel(Posterior.of(whole.model, manoeuvres, step=whole.step)).fit()
+    fitted = noise_faults()["accel-noise"].measured(fit)
+    degrees = FitResidual(fit).by_sensor[SensorKind.ACCEL].degrees
+    assert fitted.sd[0] / fitted.mean[0] == pytest.approx(stats.chi(degrees).std() / np.sqrt(degrees), rel=0.01)
+
+
+def test_the_density_of_coloured_noise_is_that_of_what_is_simulated(planar_case):
+    """Whittle's estimate from a wandering residual has its size and correlation time."""
+    fit, rng = PerturbedModel(planar_case.posterior).fit(), np.random.default_rng(8)
+    view, time = fit.view, 4.0
+    interval = float(np.median(np.diff(planar_case.posterior.data.times(0))))
+    rho = np.exp(-interval / time)
+    wander = np.zeros((view.values.shape[1], view.values.shape[2]))
+    for row in range(1, len(wander)):
+        wander[row] = rho * wander[row - 1] + 3.0 * np.sqrt(1.0 - rho**2) * rng.normal(size=wander.shape[1])
+    residual = (view.values[0] + np.where(view.values[0] != 0.0, wander, 0.0)).ravel()
+    fitted = noise_faults()["coloured-noise:accel"].measured(replace(fit, residual=residual))
+    assert fitted.mean[0] == pytest.approx(3.0 * SIGMA, rel=0.4)
+    assert fitted.mean[1] == pytest.approx(time, rel=0.7)
+
+
 def test_the_noise_of_the_encoders_is_stated_as_a_factor(planar_case):
     whole = planar_case.posterior
     (kept,) = without_stated_faults(stated('"encoder-noise" = { factor = 2.0 }'), whole.model, whole.manoeuvres)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.signal import periodogram
 
 from bayesid._io.errors import InputError
+from bayesid.simulation.effects import create
 from bayesid.simulation.sensors import AngleRandomWalk, Filter, NoiseDensity, Sensor, SensorKind, StarTracker, White
 
 AXES = (1.0e-5, 2.0e-5, 3.0e-5)
@@ -109,3 +113,12 @@ def test_mounting_turns_sensor_axes_into_base_axes():
 def test_units():
     shipped = (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
     assert {kind.value: kind.unit for kind in shipped} == {"rate": "rad/s", "accel": "m/s2", "attitude": "rad"}
+
+
+def test_an_accelerometer_elsewhere_reads_the_acceleration_of_a_point_of_a_rigid_body():
+    """Of a base that turns at a constant rate about z, and of one that starts to turn."""
+    effect, error = create("accel-position"), jnp.array([0.3, 0.0, 0.0])
+    turning = SimpleNamespace(rate=jnp.array([0.0, 0.0, 2.0]), rate_change=jnp.zeros(3))
+    starting = SimpleNamespace(rate=jnp.zeros(3), rate_change=jnp.array([0.0, 0.0, 5.0]))
+    assert effect.specific_force(error, turning, jnp.zeros(3)) == pytest.approx([-4.0 * 0.3, 0.0, 0.0])
+    assert effect.specific_force(error, starting, jnp.zeros(3)) == pytest.approx([0.0, 5.0 * 0.3, 0.0])

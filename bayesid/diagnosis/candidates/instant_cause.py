@@ -166,8 +166,7 @@ class InstantCause(CauseKind):
                 if max(weight[0], weight[-1]) > EDGE and reach[r] < times[r].max():
                     reach[r] *= WIDENED
                     continue
-                mean, interval = float(weight @ tried[r]), reach[r] / POINTS
-                found[r] = mean, float(np.sqrt(weight @ (tried[r] - mean) ** 2 + interval**2 / 12.0))
+                found[r] = _mean_and_sd(weight, tried[r], reach[r] / POINTS)
                 unsettled.remove(r)
         names = [item.recording.name for item in fit.posterior.manoeuvres]
         return [CauseAmplitude(Quantity(f"{names[r]}.time", "s"), *found[r]) for r in sorted(found)]
@@ -195,7 +194,7 @@ class InstantCause(CauseKind):
         samples = [len(steps) + 1 for steps, instant in zip(intervals, chosen, strict=True) if instant is not None]
         if not samples:
             return point
-        share = SHARE / (2.0 ** len(ends) - 1.0) / float(np.prod(samples, dtype=float))
+        share = _share(samples, len(ends))
         instants = tuple(np.inf if instant is None else instant for instant in chosen)
         columns = self.responses(point.perturbed, point.fit, effect, np.array(instants)[:, None])[:, 0]
         name = f"{effect.label} at {', '.join(f'{instant:.5g}' for instant in instants)} s"
@@ -257,6 +256,17 @@ class MassShiftCause(InstantCause):
         perturbation = perturbed.perturbation(some * count, node_rows=rows[0], sample_rows=rows[1])
         found = by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data))
         return np.moveaxis(found.reshape(*found.shape[:2], some, count), 2, 1)
+
+
+def _share(samples: Sequence[int], recordings: int) -> float:
+    """Return the prior probability of one instant in each of some recordings, which have so many samples."""
+    return SHARE / (2.0**recordings - 1.0) / float(np.prod(samples, dtype=float))
+
+
+def _mean_and_sd(weight: Floats, times: Floats, interval: float) -> tuple[float, float]:
+    """Return mean and standard deviation of a time that is uniform in intervals of these probabilities."""
+    mean = float(weight @ times)
+    return mean, float(np.sqrt(weight @ (times - mean) ** 2 + interval**2 / 12.0))
 
 
 def grid_instants(end: float) -> Floats:
