@@ -43,7 +43,7 @@ def test_prior_and_bounds_of_a_study_reach_the_diagnosis(tmp_path, monkeypatch):
         given.update(options)
         raise ReachedError
 
-    monkeypatch.setattr(bayesid.diagnosis, "diagnose", instead)
+    monkeypatch.setattr("bayesid.app.functions.diagnose_study.diagnose_motion", instead)
     with pytest.raises(ReachedError):
         list(diagnose_study(stated(tmp_path, STATED), tmp_path / "results", 0, None))
     assert given["prior"] == CausePrior(0.2, 0.05)

@@ -27,12 +27,12 @@ ROOT = Path(__file__).resolve().parents[1]
 CONTRACT = ROOT.parent / "shared" / "CONTRACT.md"
 
 WRITERS = (
-    "app.check_command",
-    "app.design_command",
-    "app.identifiability_command",
+    "app.functions.check_study",
+    "app.functions.design_study",
+    "app.functions.identifiability_of_study",
+    "app.functions.predict_study",
+    "app.functions.simulate_study",
     "app.import_command",
-    "app.predict_command",
-    "app.simulate_command",
     "design.base_prediction",
     "design.design_result",
     "design.go_no_go",

@@ -754,7 +754,7 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
             Status.UNRESOLVED: lambda: judged(biased, Status.UNRESOLVED),
         }[status]()
         vars(result)["posterior"] = biased.before.fit.posterior  # for its sentences only; not built again
-        diagnosis_report(result, None, "Träger #1 *bold*", file, record=RECORD, advice=ADVICE, origin=ORIGIN)
+        diagnosis_report(replace(result, advice=ADVICE), "Träger #1 *bold*", file, record=RECORD, origin=ORIGIN)
         return result, PdfText.read(file)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -769,7 +769,7 @@ def test_a_report_is_written_where_the_extended_model_cannot_be_simulated(biased
 
     result = judged(biased, Status.EXPLAINED)
     monkeypatch.setattr(import_module("bayesid.diagnosis.result"), "extended_posterior", refuse)
-    diagnosis_report(result, None, "Lost motion", tmp_path / "report.pdf")
+    diagnosis_report(result, "Lost motion", tmp_path / "report.pdf")
     text = PdfText.read(tmp_path / "report.pdf")
     assert "neither simulated in full nor sampled: the simulation gives no finite readings." in text
     assert "Measured and simulated" not in text
@@ -873,7 +873,7 @@ def test_the_identification_follows_the_diagnosis(biased, tmp_path, monkeypatch)
     module = import_module("bayesid.report.diagnosis.diagnosis_report")
     monkeypatch.setattr(module, "add_identification", lambda _, result, said: added.append(result))
     sampled = SimpleNamespace()
-    diagnosis_report(biased, sampled, "Study", tmp_path / "report.pdf")
+    diagnosis_report(replace(biased, identification=sampled), "Study", tmp_path / "report.pdf")
     assert added == [sampled]
     text = PdfText.read(tmp_path / "report.pdf")
     assert "How the verdict was reached" in text
@@ -885,8 +885,8 @@ def test_the_verdict_outlives_an_interrupted_sampling(biased, tmp_path, monkeypa
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bayesid.diagnosis, "diagnose", lambda *_, **__: biased)
-    monkeypatch.setattr(bayesid.diagnosis, "identify_extended", interrupt)
+    monkeypatch.setattr("bayesid.app.functions.diagnose_study.diagnose_motion", lambda *_, **__: biased)
+    monkeypatch.setattr("bayesid.app.functions.diagnose_study.identify_extended", interrupt)
     study = Study.load(Path(bayesid.__file__).parent / "app" / "demonstration_data" / "study.toml")
     with pytest.raises(KeyboardInterrupt):
         list(diagnose_study(study, tmp_path / "out", 0, 100.0))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 
-def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0) -> Iterator[str]:
+def run(output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0) -> Iterator[str]:
     """Diagnose shipped recordings with a hidden cause, show that cause and write the report, without any input file."""
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
@@ -27,7 +27,7 @@ def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4
     yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
     result: list[Diagnosis] = []
     study = Study.load(output / "study" / "study.toml")
-    yield from diagnose_study(study, output, seed, samples, progress, result.append)
+    yield from diagnose_study(study, output, seed, effective_samples, progress, result.append)
     named = result[0].verdict.causes
     for cause, values in answer.items():
         parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())

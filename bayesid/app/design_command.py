@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Annotated
 
@@ -42,10 +41,11 @@ def run(
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.store import content_key
     from bayesid._io.words import counted
+    from bayesid.app.functions.design_study import design, effort_of
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_design import load_problem, separating, write_motion
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
-    from bayesid.design import THOROUGH, Search, Store, best_design, design
+    from bayesid.design import Store
     from bayesid.report import design_report
     from bayesid.report.design_report import design_sentences
 
@@ -61,26 +61,24 @@ def run(
     if assumed:
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
-    effort = replace(THOROUGH if thorough else Search(), starts=starts, iterations=iterations)
+    effort = effort_of(starts, iterations, thorough)
     key = content_key(bayesid.__version__, *study.defining_files, seed, effort, *(separate or ()))
+    asked = {"starts": starts, "iterations": iterations, "thorough": thorough}
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)
         try:
-            with executor_at(scheduler) if scheduler else ThreadPoolExecutor(os.cpu_count()) as executor:
-                designs = design(
-                    problem, seed, noise, replace(effort, executor=executor), store=store, progress=progress
-                )
-            best = best_design(designs)
+            with executor_at(scheduler) if scheduler else nullcontext() as executor:
+                searching = {"encoder": noise, "executor": executor, "store": store, "progress": progress}
+                result = design(problem, seed, **asked, **searching)
         except InputError as error:
             raise error.within(file=file) from None
+        result = replace(result, title=study.title)
         with complete_folder(output) as folder:
-            content = {"title": study.title, "seed": seed, "manoeuvres": [motion.to_dict() for motion in designs]}
-            write_json(folder / "design.json", {**content, "best": best.name})
-            for motion in designs:
+            write_json(folder / "design.json", result.to_dict())
+            for motion in result.manoeuvres:
                 write_motion(motion, folder / f"{motion.name}.csv")
-            effort_words = (("starts", starts), ("iterations", iterations), ("thorough", thorough))
-            origin = report_origin(study, "design", seed, output=output, **dict(effort_words), separate=separate)
-            design_report(designs, best, study.title, folder / "report.pdf", origin=origin)
+            origin = report_origin(study, "design", seed, output=output, **asked, separate=separate)
+            design_report(result.manoeuvres, result.best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
-    yield from design_sentences(designs, best)
+    yield from design_sentences(result.manoeuvres, result.best)
     yield f"Wrote {output / 'report.pdf'}."

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Samples, Seed, StudyFile
 
@@ -16,7 +15,7 @@ __all__ = ["run"]
 
 
 def run(
-    file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0
+    file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0
 ) -> Iterator[str]:
     """Identify the unknown bodies, by the posterior of their inertial parameters."""
     from bayesid.app.schema import Study
@@ -27,34 +26,30 @@ def run(
 
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.progress import PhaseClock
+    from bayesid.app.functions.identify_study import identify
+    from bayesid.app.functions.study_source import recorded_posterior
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
-    from bayesid.app.study_to_model import load_posterior
-    from bayesid.inference import identify
     from bayesid.inference.posterior_as_prior import write_identified
     from bayesid.inference.posterior_file import write_netcdf
-    from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import identification_report
 
     clock = PhaseClock()
-    posterior = load_posterior(study)
-    refuse_wrong_units(posterior)
-    if not posterior.size:
-        raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
+    posterior = recorded_posterior(study)
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
     yield from open_places(study)
     clock.ends("load")
     with claimed_folder(output):
         progress(0.0, "fitting")
         kept = output / "samples.h5"
-        result = identify(posterior, seed, effective_samples=samples, file=kept, progress=progress)
+        result = identify(posterior, seed, effective_samples=effective_samples, file=kept, progress=progress)
         clock.ends("fit")
         clock.moves("fit", "sample", result.seconds)
         with complete_folder(output) as folder:
             write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
             if result.posterior.model.priors:
                 write_identified(result, folder)
-            origin = report_origin(study, "identify", seed, output=output, samples=samples)
+            origin = report_origin(study, "identify", seed, output=output, samples=effective_samples)
             identification_report(result, study.title, [], folder / "report.pdf", origin=origin)
             clock.ends("report")
             write_json(

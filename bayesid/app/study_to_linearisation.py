@@ -23,7 +23,14 @@ from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.model import Manoeuvre, Model
 
-__all__ = ["LinearisationPoint", "lacking_sensors", "missing_part", "planned_manoeuvres", "prepare"]
+__all__ = [
+    "LinearisationPoint",
+    "fitted_point",
+    "lacking_sensors",
+    "missing_part",
+    "planned_manoeuvres",
+    "prepare",
+]
 
 # deviation of chi-square from its mean, in standard deviations of chi-square, that noise alone rarely reaches
 MISFIT = 3.0
@@ -64,10 +71,22 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
         return _predicted(study, model, manoeuvres, lacking)
     posterior = Posterior.of(model, manoeuvres)
     refuse_wrong_units(posterior)
-    refined, optimum = maximise(posterior, np.random.default_rng(seed))
+    return fitted_point(posterior, np.random.default_rng(seed))
+
+
+def fitted_point(posterior: Posterior, rng: np.random.Generator) -> LinearisationPoint:
+    """Return the linearisation point of a posterior, which is fitted.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    rng : numpy.random.Generator
+        Source of the random starts of the fit.
+    """
+    refined, optimum = maximise(posterior, rng)
     statement = (
-        f"The model was fitted to {_count(manoeuvres)} with {refined.samples} scalar sensor samples; chi-square is "
-        f"{optimum.chi2 / refined.samples:.3f} per sample."
+        f"The model was fitted to {_count(posterior.manoeuvres)} with {refined.samples} scalar sensor samples; "
+        f"chi-square is {optimum.chi2 / refined.samples:.3f} per sample."
     )
     if optimum.chi2 - refined.samples > MISFIT * np.sqrt(2.0 * refined.samples):
         statement += " The model does not explain the data: what follows supposes that it does, so diagnose them first."

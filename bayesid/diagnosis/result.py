@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from bayesid._math.arrays import Floats
+from bayesid.design.design_result import Design
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Remainder, Status, VerdictSensitivity
@@ -73,6 +74,14 @@ class Diagnosis:
     seed : int
     seconds : dict of str to float
         Time by phase.
+    identification : Identification or None
+        Of the extended model, where it was sampled.
+    not_sampled : str or None
+        Why the extended model was not sampled, where that failed.
+    next_manoeuvre : Design or None
+        Manoeuvre that would decide an undecided verdict, where it was designed.
+    advice : str or None
+        What to fly next, or why that was not designed.
     """
 
     before: Hypothesis
@@ -89,6 +98,10 @@ class Diagnosis:
     bounds: Mapping[str, tuple[PhysicalBound, ...]]
     seed: int
     seconds: dict[str, float]
+    identification: Identification | None = None
+    not_sampled: str | None = None
+    next_manoeuvre: Design | None = None
+    advice: str | None = None
 
     @property
     def verdict(self) -> ProbableVerdict:
@@ -254,14 +267,8 @@ class Diagnosis:
         """Fit the present model with some causes of the catalogue."""
         return self.search.under(causes).fit(causes, self.effects) if causes else self.before
 
-    def to_dict(self, identification: Identification | None = None) -> dict[str, Any]:
-        """Return the content of diagnosis.json.
-
-        Parameters
-        ----------
-        identification : Identification, optional
-            Of the extended model, where it was sampled.
-        """
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of diagnosis.json."""
         verdict, probabilities = self.verdict, self.probabilities
         fitted = {name: _fitted(self, name) for name in verdict.causes}
         return {
@@ -306,7 +313,7 @@ class Diagnosis:
             },
             "prior": {"one_more_cause": probabilities.prior.one_more, "generic": probabilities.prior.generic},
             "seconds": dict(self.seconds),
-            "identification": None if identification is None else identification.to_dict(),
+            "identification": None if self.identification is None else self.identification.to_dict(),
         }
 
 

@@ -20,29 +20,18 @@ __all__ = ["diagnosis_report"]
 
 
 def diagnosis_report(
-    result: Diagnosis,
-    identification: Identification | None,
-    title: str,
-    file: Path,
-    *,
-    record: str | None = None,
-    advice: str | None = None,
-    origin: str | None = None,
+    result: Diagnosis, title: str, file: Path, *, record: str | None = None, origin: str | None = None
 ) -> None:
     """Write the report of a diagnosis as PDF, whole or not at all.
 
     Parameters
     ----------
     result : Diagnosis
-    identification : Identification or None
-        Identification with the extended model, None where it was not sampled.
     title : str
         Title of the study.
     file : path
     record : str, optional
         How often such a verdict was right where the truth was known, as a sentence.
-    advice : str, optional
-        Manoeuvre that was designed to decide an undecided verdict, as a sentence.
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
@@ -54,7 +43,8 @@ def diagnosis_report(
     add_evidence(document, result)
     add_causes(document, result)
     add_consequences(document, result)
-    add_limits(document, result, advice)
+    add_limits(document, result, result.advice)
+    identification = result.identification
     refusal = None if identification is not None else _refusal(result)
     if refusal is not None:
         document.section("Assumptions")

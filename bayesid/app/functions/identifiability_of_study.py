@@ -1,0 +1,122 @@
+"""What a robot's structure and a study's data can determine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bayesid._io.progress import Progress, silent
+from bayesid.app.functions.study_source import StudySource, study_of
+from bayesid.app.study_to_linearisation import LinearisationPoint, fitted_point, missing_part, prepare
+from bayesid.app.study_to_model import load_robot
+from bayesid.identifiability.base_parameters import BaseParameters, base_parameters
+from bayesid.identifiability.practical_identifiability import Practical, practical
+from bayesid.inference.posterior import Posterior
+from bayesid.report.identifiability_report import advice_sentences, practical_sentences, structure_sentence
+from bayesid.robot.robot import Robot
+
+__all__ = ["Identifiability", "identifiability"]
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """Result of `identifiability`.
+
+    Attributes
+    ----------
+    title : str
+        Title of the study.
+    structure : BaseParameters
+        What motion of the robot can show at all.
+    practical : Practical or None
+        What these manoeuvres, sensors and priors tell; None where they are not given.
+    statement : str
+        On what `practical` rests, or why it is not evaluated.
+    """
+
+    title: str
+    structure: BaseParameters
+    practical: Practical | None
+    statement: str
+
+    @property
+    def sentences(self) -> list[str]:
+        """What can be known, how well, and what would tell more."""
+        lines = [structure_sentence(self.structure), self.statement]
+        if self.practical is not None:
+            lines += [*practical_sentences(self.practical), *advice_sentences(self.practical)]
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of identifiability.json."""
+        structure = {
+            "standard_parameters": len(self.structure.standard),
+            "base_parameters": len(self.structure.independent),
+            "independent": list(self.structure.independent),
+            "dependent": list(self.structure.dependent),
+            "regrouping": self.structure.regrouping.tolist(),
+        }
+        unknown = {"basis": "not evaluated", "directions": [], "parameters": [], "advice": []}
+        evaluated = unknown if self.practical is None else self.practical.to_dict()
+        return {"title": self.title, **structure, **evaluated, "statement": self.statement}
+
+    def __str__(self) -> str:
+        """Return the sentences, one a line."""
+        return "\n".join(self.sentences)
+
+
+def identifiability(
+    study: StudySource | Posterior | Robot,
+    seed: int = 0,
+    *,
+    effective_samples: float = 500.0,
+    profiles: int = 6,
+    progress: Progress = silent,
+) -> Identifiability:
+    """Determine what manoeuvres and sensors tell of the bodies, and what would tell more.
+
+    Parameters
+    ----------
+    study : path, Study, Posterior or Robot
+        Of a robot alone, only what its structure allows is determined.
+    seed : int
+        Seed of all random numbers.
+    effective_samples : float
+        Number of effective samples where emcee is needed.
+    profiles : int
+        Largest number of parameters to profile.
+    progress : Progress, optional
+        Receiver of the fraction done.
+
+    Raises
+    ------
+    InputError
+        If the study is wrong.
+    """
+    title, missing = "", "no recordings are given" if isinstance(study, Robot) else ""
+    if isinstance(study, Posterior):
+        robot = study.model.robot
+    elif isinstance(study, Robot):
+        robot = study
+    else:
+        study = study_of(study)
+        title, missing, robot = study.title, missing_part(study), load_robot(study)
+    structure = base_parameters(robot)
+    if missing or isinstance(study, Robot):
+        return Identifiability(title, structure, None, f"Practical identifiability is not evaluated: {missing}.")
+    progress(0.0, "fitting")
+    point: LinearisationPoint = (
+        fitted_point(study, np.random.default_rng(seed)) if isinstance(study, Posterior) else prepare(study, seed)
+    )
+    evaluated = practical(
+        point.posterior,
+        point.optimum,
+        point.basis,
+        seed,
+        effective_samples=effective_samples,
+        profiles=profiles,
+        progress=progress,
+    )
+    return Identifiability(title, structure, evaluated, point.statement)

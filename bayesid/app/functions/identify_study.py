@@ -1,0 +1,62 @@
+"""Identification of a study's unknown bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
+from bayesid._math.arrays import Floats
+from bayesid.app.functions.study_source import StudySource, recorded_posterior
+from bayesid.inference import identification
+from bayesid.inference.identification import Identification
+from bayesid.inference.posterior import Posterior
+
+__all__ = ["identify"]
+
+
+def identify(
+    study: StudySource | Posterior,
+    seed: int = 0,
+    *,
+    effective_samples: float = 4000.0,
+    start: Floats | None = None,
+    max_steps: int = 5000,
+    file: Path | None = None,
+    progress: Progress = silent,
+) -> Identification:
+    """Identify the unknown bodies and effects by their posterior.
+
+    Parameters
+    ----------
+    study : path, Study or Posterior
+    seed : int
+        Seed of all random numbers.
+    effective_samples : float
+        Goal for the number of effective samples.
+    start : (size,) array, optional
+        Starting point of the search for the mode, by default the prior's centre.
+    max_steps : int
+        Largest number of steps of each of emcee's ensembles.
+    file : path, optional
+        HDF5 file of emcee that keeps every step; a run that was interrupted goes on from there.
+    progress : Progress, optional
+        Receiver of the fraction done.
+
+    Raises
+    ------
+    InputError
+        If the study is wrong, nothing is unknown, or no value of the unknowns comes near the data.
+    """
+    posterior = recorded_posterior(study)
+    if not posterior.size:
+        raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
+    return identification.identify(
+        posterior,
+        seed,
+        start=start,
+        effective_samples=effective_samples,
+        max_steps=max_steps,
+        file=file,
+        progress=progress,
+    )

@@ -1,0 +1,128 @@
+"""Loop over a study: plan a manoeuvre, have it executed, identify, diagnose, plan again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bayesid._io.errors import InputError
+from bayesid._io.files import claimed_folder
+from bayesid._io.progress import Progress, silent
+from bayesid.app.functions.study_source import StudySource, study_of
+from bayesid.app.study_to_design import load_loop_problem
+from bayesid.app.study_to_encoders import encoder_noise
+from bayesid.app.study_to_model import loop_review
+from bayesid.app.user_files import load_spacecraft
+from bayesid.design import Loop, Sampled, Spacecraft
+from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, RelativePrecision, TipRegion
+from bayesid.design.loop_history import History
+from bayesid.simulation.model import Model
+
+__all__ = ["loop"]
+
+
+def loop(
+    study: StudySource,
+    output: Path,
+    seed: int = 0,
+    *,
+    effective_samples: float = 2000.0,
+    spacecraft: Path | Spacecraft | None = None,
+    precision: float | None = None,
+    wanted_sd: Sequence[str] | None = None,
+    wanted_tip: float | None = None,
+    wanted_cause: str | None = None,
+    at_most: int = 5,
+    diagnose: bool = True,
+    progress: Progress = silent,
+) -> History:
+    """Plan a manoeuvre, have it executed, identify, diagnose, plan again, until what is wanted is known.
+
+    Parameters
+    ----------
+    study : path or Study
+    output : path
+        Folder that keeps every step; the loop goes on from what it holds.
+    seed : int
+        Seed of all random numbers.
+    effective_samples : float
+        Goal for the number of effective samples of each identification.
+    spacecraft : Spacecraft or path, optional
+        What executes plans, or the Python file that defines it; without it, recordings are put into the folder.
+    precision : float, optional
+        Relative standard deviation of mass and principal moments; 0.01 if nothing else is wanted.
+    wanted_sd : sequence of str, optional
+        ``BODY.QUANTITY=SD``, standard deviations in SI units.
+    wanted_tip : float, optional
+        Longest semi-axis of the end-effector's 95 % region [mm].
+    wanted_cause : str, optional
+        ``NAME`` or ``NAME=PROBABILITY`` of a cause whose presence is to be decided, by default to 0.95.
+    at_most : int
+        Largest number of manoeuvres.
+    diagnose : bool
+        Whether to diagnose after every step, and stop if the model is wrong.
+    progress : Progress, optional
+        Receiver of the fraction done.
+
+    Raises
+    ------
+    InputError
+        If the study or a goal is wrong, a plan is impossible or a recording does not fit.
+    """
+    if at_most < 1:
+        raise InputError(f"{at_most} manoeuvres", place="--at-most", remedy="Allow at least one")
+    study = study_of(study)
+    problem = load_loop_problem(study)
+    model, tip_frame = problem.plan.model, None if study.design is None else study.design.tip_frame
+    made = Loop(
+        problem,
+        encoder_noise(study, model.robot),
+        seed=seed,
+        goals=_goals(model, precision, wanted_sd or (), wanted_tip, wanted_cause, tip_frame),
+        at_most=at_most,
+        identifier=Sampled(effective_samples),
+        reviewer=loop_review(study) if diagnose else None,
+    )
+    executing = load_spacecraft(Path(spacecraft)) if isinstance(spacecraft, (str, Path)) else spacecraft
+    with claimed_folder(Path(output)):
+        return made.run(executing, Path(output), progress)
+
+
+def _goals(
+    model: Model,
+    precision: float | None,
+    deviations: Sequence[str],
+    region: float | None,
+    cause: str | None,
+    tip_frame: str | None,
+) -> tuple[Goal, ...]:
+    """Return the goals of a loop; a relative precision of 1 % where nothing else is wanted."""
+    goals: list[Goal] = []
+    if precision is not None:
+        if not 0.0 < precision < 1.0:
+            problem = f"{precision:g} is not between 0 and 1"
+            raise InputError(problem, place="--wanted", remedy="Give a relative precision: 0.01 is 1 %")
+        goals.append(RelativePrecision(precision))
+    for text in deviations:
+        name, _, value = text.partition("=")
+        bodies = [body.name for body in model.bodies]
+        body = next((body for body in bodies if name.startswith(f"{body}.")), None)
+        if body is None:
+            remedy = f"Write BODY.QUANTITY=SD, with a body among {', '.join(bodies)}: {bodies[0]}.mass=0.5"
+            raise InputError(f"{text!r} names no body to identify", place="--wanted-sd", remedy=remedy)
+        goals.append(QuantitySd(body, name.removeprefix(f"{body}."), _number(value, text, "--wanted-sd")))
+    if region is not None:
+        if not region > 0.0:
+            raise InputError(f"{region:g} mm", place="--wanted-tip", remedy="Give a positive number of millimetres")
+        goals.append(TipRegion(1e-3 * region, tip_frame))
+    if cause is not None:
+        name, sign, value = cause.partition("=")
+        goals.append(CauseProbability(name, _number(value, cause, "--wanted-cause") if sign else 0.95))
+    return tuple(goals) or (RelativePrecision(),)
+
+
+def _number(text: str, whole: str, place: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{whole!r} has no number after '='", place=place, remedy="Write NAME=NUMBER") from None

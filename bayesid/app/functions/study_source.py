@@ -1,0 +1,36 @@
+"""What the functions of the commands take: a study file, a study, or the objects that a study describes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_posterior
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.wrong_units import refuse_wrong_units
+
+__all__ = ["StudySource", "recorded_posterior", "study_of"]
+
+StudySource = Study | str | Path
+"""A study, or the path of its file."""
+
+
+def study_of(source: StudySource) -> Study:
+    """Return the study, which is read if a path is given."""
+    return source if isinstance(source, Study) else Study.load(source)
+
+
+def recorded_posterior(source: StudySource | Posterior, window: int | None = None) -> Posterior:
+    """Return the posterior of a study's recordings, whose units are checked; a posterior is returned as it is.
+
+    Parameters
+    ----------
+    source : Study, path or Posterior
+    window : int, optional
+        As for `Posterior.of`.
+    """
+    if isinstance(source, Posterior):
+        return source
+    posterior = load_posterior(study_of(source), window=window)
+    refuse_wrong_units(posterior)
+    return posterior

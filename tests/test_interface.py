@@ -1,0 +1,115 @@
+"""The functions of the package's top level: complete, lazy, and those of the command line."""
+
+import ast
+import importlib
+import inspect
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import PLANAR
+from test_cli import run
+from test_identifiability_command import study
+
+import bayesid
+from bayesid.robot.robot import Robot
+
+assert study  # the fixture of a small study
+
+COMMANDS = ("check", "identify", "diagnose", "identifiability", "design", "predict", "simulate", "loop")
+
+OF_THE_COMMAND = {"file", "output", "progress", "scheduler"}
+"""Parameters of the commands alone, or that have another form in Python."""
+
+
+def test_every_name_is_loaded_and_known_to_type_checkers():
+    tree = ast.parse(Path(bayesid.__file__).read_text(encoding="utf-8"))
+    seen = next(node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    stated = {alias.name: line.module for line in seen.body if isinstance(line, ast.ImportFrom) for alias in line.names}
+    assert sorted(stated) == bayesid.__all__ == sorted(bayesid.__all__)
+    for name, module in stated.items():
+        assert getattr(bayesid, name) is getattr(importlib.import_module(module), name)
+    with pytest.raises(AttributeError, match="no attribute 'banana'"):
+        _ = bayesid.banana
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_has_the_defaults_of_its_function(name):
+    command = inspect.signature(importlib.import_module(f"bayesid.app.{name}_command").run).parameters
+    function = inspect.signature(getattr(bayesid, name)).parameters
+    shared = set(command) - OF_THE_COMMAND
+    assert shared <= set(function)
+    assert {key: command[key].default for key in shared} == {key: function[key].default for key in shared}
+
+
+@pytest.mark.parametrize("name", ["design", "identifiability"])
+def test_a_function_with_the_name_of_a_room_stays_one(name):
+    function, room = getattr(bayesid, name), importlib.import_module(f"bayesid.{name}")
+    assert inspect.isfunction(function)
+    assert function is getattr(bayesid, name)
+    assert inspect.ismodule(room)
+
+
+def test_the_order_of_imports_does_not_matter():
+    code = "import bayesid.design.criteria, bayesid.identifiability; from bayesid import design, identifiability; "
+    code += "import bayesid; assert bayesid.design is design and callable(design) and callable(identifiability); "
+    code += (
+        "from bayesid.design import Problem; from bayesid.design.criteria import DOptimal; import bayesid.design.plan; "
+    )
+    code += "assert bayesid.design is design and bayesid.Problem is Problem"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def written(file: Path) -> dict:
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def as_json(result: object) -> dict:
+    def plain(value: object) -> object:
+        return value.tolist() if isinstance(value, np.ndarray | np.generic) else list(value)
+
+    return json.loads(json.dumps(result.to_dict(), default=plain))
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "options"),
+    [
+        ("check", "check.json", {}),
+        ("simulate", "simulation.json", {"seed": 4}),
+        ("predict", "prediction.json", {"seed": 4, "draws": 20}),
+        pytest.param(
+            *("identify", "identification.json", {"seed": 4, "effective_samples": 100.0}), marks=pytest.mark.slow
+        ),
+        pytest.param(*("identifiability", "identifiability.json", {"seed": 4, "profiles": 0}), marks=pytest.mark.slow),
+    ],
+)
+def test_a_command_writes_what_its_function_returns(name, file, options, study, tmp_path):
+    words = {"effective_samples": "samples"}
+    given = [word for key, value in options.items() for word in (f"--{words.get(key, key)}", value)]
+    status, output = run(name, study, "--output", tmp_path, *given)
+    assert status == 0, output
+    content, result = written(tmp_path / file), as_json(getattr(bayesid, name)(study, **options))
+    if name == "identify":  # the command adds what the study states of the noise, and measures times
+        assert content.pop("noise") == {}
+        assert content.pop("seconds").keys() >= {"fit", "sample"}
+        assert content["sampler"].pop("seconds") > 0.0
+        assert result["sampler"].pop("seconds") > 0.0
+    assert content == result
+
+
+def test_a_robot_alone_has_a_structure(tmp_path):
+    robot = Robot.from_urdf(PLANAR)
+    result = bayesid.identifiability(robot)
+    assert (len(result.structure.standard), len(result.structure.independent)) == (30, 24)
+    assert result.practical is None
+    assert "Practical identifiability is not evaluated: no recordings are given." in str(result)
+
+
+def test_objects_do_as_well_as_a_study(study):
+    posterior = bayesid.load_posterior(bayesid.Study.load(study))
+    assert as_json(bayesid.simulate(posterior, seed=4)) == as_json(bayesid.simulate(study, seed=4))
+    (recording,) = bayesid.predict(posterior.model, posterior.manoeuvres, 4, draws=20).recordings
+    assert recording.to_dict() == bayesid.predict(study, seed=4, draws=20).recordings[0].to_dict()
