@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from bayesid.robot.body_prior import BodyPrior
     from bayesid.robot.inertial_parameters import InertialParameters
     from bayesid.robot.robot import Load, Robot
+    from bayesid.robot.wheel import Wheel
     from bayesid.simulation.effects import Effect, Parameter, Wrench, create, known_effects, register
     from bayesid.simulation.joint_torques import TorqueSensor
     from bayesid.simulation.model import Manoeuvre, Model
@@ -108,6 +109,7 @@ __all__ = [
     "Study",
     "StudyCheck",
     "TorqueSensor",
+    "Wheel",
     "White",
     "Wrench",
     "check",
@@ -151,6 +153,7 @@ _NAMES = {
     "robot.body_prior": "BodyPrior",
     "robot.inertial_parameters": "InertialParameters",
     "robot.robot": "Load Robot",
+    "robot.wheel": "Wheel",
     "simulation.effects": "Effect Parameter Wrench create known_effects register",
     "simulation.joint_torques": "TorqueSensor",
     "simulation.model": "Manoeuvre Model",

@@ -24,7 +24,8 @@ from bayesid.design.design_problem import Problem
 from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
 from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily, extended_posture
-from bayesid.recording.recording import Recording
+from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
+from bayesid.recording.sampled_curve import SampledCurve
 from bayesid.robot.kinematics import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
@@ -65,6 +66,7 @@ def load_problem(study: Study) -> Problem:
             argument_of_latitude=section.argument_of_latitude,
             step=_step(model, section, limits),
             thinning=math.ceil(section.duration / section.interval / SAMPLES),
+            wheel_speeds=_wheel_speeds(model.robot, section),
         )
         _check_traceable(plan)
         return Problem(plan, limits, criteria_of(section))
@@ -130,6 +132,19 @@ def _with_rivals(model: Model, section: DesignSection) -> Model:
             problem = f"effect {effect.label!r} has no unknown size by which it could be told from others"
             raise InputError(problem, place="design.rivals", remedy="Name effects with parameters")
     return model
+
+
+def _wheel_speeds(robot: Robot, section: DesignSection) -> dict[str, SampledCurve]:
+    """Return the stated speeds of wheels, each constant or through given points."""
+    curves = {}
+    for name, stated in section.wheel_speed.items():
+        try:
+            robot.wheel_index(name)
+        except InputError as error:
+            raise error.within(place=f"design.wheel_speed.{name}") from None
+        points = np.array([(0.0, stated)] if isinstance(stated, float) else stated)
+        curves[name] = SampledCurve(points[:, 0], points[:, 1:])
+    return curves
 
 
 def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
@@ -223,7 +238,7 @@ def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progres
 
 
 def write_motion(design: Design, file: Path) -> None:
-    """Write the positions of the joints along a manoeuvre as a recording.
+    """Write the positions of the joints and the speeds of the wheels along a manoeuvre as a recording.
 
     Parameters
     ----------
@@ -233,5 +248,6 @@ def write_motion(design: Design, file: Path) -> None:
         Recording to write, as CSV.
     """
     recording = design.manoeuvre.recording
-    joints = {key: values for key, values in recording.channels.items() if key.startswith("position.")}
-    Recording(design.name, None, recording.time, joints).write(file)
+    kept = (f"{JOINT_FAMILIES[0]}.", f"{WHEEL_SPEED}.")
+    plan = {key: values for key, values in recording.channels.items() if key.startswith(kept)}
+    Recording(design.name, None, recording.time, plan).write(file)

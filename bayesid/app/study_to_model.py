@@ -21,10 +21,12 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
-from bayesid.recording.recording import JOINT_FAMILIES, Recording
+from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
+from bayesid.recording.wheel_motion import check_wheels
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize
+from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects import Effect, SensorBias, create, known_effects
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -81,6 +83,8 @@ def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
     try:
         for load in study.robot.loads:
             robot = robot.with_load(Load(load.name, load.link, load.parameters))
+        for wheel in study.robot.wheels:
+            robot = robot.with_wheel(Wheel(wheel.name, wheel.axis, wheel.inertia, wheel.position))
         for name in study.unknowns.bodies:
             robot.link(name)
             if name in study.unknowns.prior:
@@ -197,7 +201,7 @@ def _refuse_copies(study: Study, manoeuvres: Sequence[Manoeuvre]) -> None:
     """Raise if two files hold the same readings of sensors; plans to simulate hold joint motion alone."""
     seen: dict[str, Path] = {}
     for number, (section, manoeuvre) in enumerate(zip(study.recordings, manoeuvres, strict=True), start=1):
-        if {name.partition(".")[0] for name in manoeuvre.recording.channels} <= {"time", *JOINT_FAMILIES}:
+        if {name.partition(".")[0] for name in manoeuvre.recording.channels} <= {"time", *JOINT_FAMILIES, WHEEL_SPEED}:
             continue
         if (same := seen.setdefault(file_key(section.file), section.file)) != section.file:
             problem = f"'{section.file.name}' holds the same as '{same.name}'"
@@ -223,6 +227,7 @@ def _check_latitudes(study: Study) -> None:
 def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = unwrapped(Recording.read(section.file), robot)
+    check_wheels(recording, robot.wheels)
     refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
     for name in section.start:
         number = study.recordings.index(section) + 1

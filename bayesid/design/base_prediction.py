@@ -201,7 +201,7 @@ def _planned(recording: Recording) -> Recording:
         problem = "a known force acts on the base, and moves the centre of mass"
         remedy = "Predict manoeuvres without thrust"
         raise InputError(problem, file=recording.file or recording.name, place="column base_force.x|y|z", remedy=remedy)
-    known = {key: recording.channels[key] for key in recording.channels if key.startswith(("base_t", "wheel_m"))}
+    known = {key: recording.channels[key] for key in recording.channels if key.startswith(("base_t", "wheel_"))}
     time = recording.time if known else np.linspace(0.0, recording.time[-1], INSTANTS)
     if time[0] > 0.0:
         time = np.concatenate([[0.0], time])

@@ -263,6 +263,7 @@ def evaluate(
         name,
         encoder,
         plan.attitude,
+        plan.wheels,
         attitude_sigma=plan.attitude_sigma,
         argument_of_latitude=plan.argument_of_latitude,
     )

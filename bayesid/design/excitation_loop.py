@@ -161,7 +161,7 @@ class Loop:
         best = attempts[-1]
         motion = plan.family.motion(best.optimum.parameters)
         time = sample_times(plan.family.duration, plan.interval)
-        plan_recording(motion, plan.model.robot, time, stem).write(history.path(number, "plan"))
+        plan_recording(motion, plan.model.robot, time, stem, plan.wheels).write(history.path(number, "plan"))
         content = {
             "go": best.go,
             "criterion": criterion.name,
@@ -260,6 +260,8 @@ class Loop:
             ),
             (plan.family.name, plan.family.names, plan.family.duration, plan.interval, plan.tip.name),
             plan.family.posture_at_rest,
+            [(w.name, w.axis, w.inertia, w.position) for w in model.robot.wheels],
+            [(name, curve.time, curve.values) for name, curve in plan.wheel_speeds.items()],
             (plan.attitude.tolist(), plan.attitude_sigma, plan.argument_of_latitude, plan.step, plan.thinning),
             [(limit.name, limit.bound) for limit in limits],
             (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder), self.reviewer),

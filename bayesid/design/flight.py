@@ -18,6 +18,7 @@ from jax import Array
 from bayesid._math.small_matrices import rotation, tilted
 from bayesid.design.plan import Plan
 from bayesid.design.trajectory import BaseAtStart, Trajectory, base_quantities, trajectory_of
+from bayesid.recording.actions import Actions
 from bayesid.robot.composite_tables import ENTRIES, Screws, beyond, row_sensitivity, screws
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, joint_motion, kinematics
@@ -134,6 +135,7 @@ class Flight:
             plan.instants,
             plan.model.orbit,
             plan.argument_of_latitude,
+            Actions.none(plan.wheels),
         )
 
     @property

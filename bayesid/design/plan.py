@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -12,6 +12,8 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.design.trajectories import TrajectoryFamily
 from bayesid.inference.unknowns import Unknowns
+from bayesid.recording.sampled_curve import SampledCurve
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.robot.kinematics import Tip
 from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
@@ -45,6 +47,8 @@ class Plan:
         Number of samples that one simulated sample stands for.
     encoder_sigma : tuple of float
         Standard deviation of the position samples of each joint [rad or m]; zero or none for exact joints.
+    wheel_speeds : mapping of str to SampledCurve
+        Planned speeds (n, 1) of the wheels [rad/s]; those left out are at rest.
     """
 
     model: Model
@@ -57,6 +61,7 @@ class Plan:
     step: float = 2.0
     thinning: int = 1
     encoder_sigma: tuple[float, ...] = ()
+    wheel_speeds: Mapping[str, SampledCurve] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what the plan is made of, without anything derived."""
@@ -73,6 +78,11 @@ class Plan:
             tilt_sigma=(self.attitude_sigma,),
             mixing=self.model.mixing,
         )
+
+    @cached_property
+    def wheels(self) -> WheelMotion:
+        """Planned motion of the wheels."""
+        return WheelMotion.planned(self.model.robot.wheels, self.wheel_speeds)
 
     @cached_property
     def simulator(self) -> Simulator:

@@ -15,6 +15,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import blank_channels, simulate_recordings
 from bayesid.recording.joint_motion import MeasuredMotion, Motion, sample_joints
 from bayesid.recording.recording import Recording
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict", "simulated"]
@@ -58,6 +59,7 @@ def planned_manoeuvre(
     name: str,
     encoder: Encoder,
     attitude: Floats | None = None,
+    wheels: WheelMotion | None = None,
     **start: float,
 ) -> Manoeuvre:
     """Return a manoeuvre with joints as recorded without noise, and placeholder samples of the sensors.
@@ -76,15 +78,14 @@ def planned_manoeuvre(
         Noise of the joints' encoders, which the smoothing assumes.
     attitude : (4,) array, optional
         Initial attitude, a quaternion x, y, z, w from base to orbit axes; by default the two agree.
+    wheels : WheelMotion, optional
+        Motion of the wheels, by default at rest.
     **start : float
         Parameters ``attitude_sigma`` and ``argument_of_latitude`` of `Manoeuvre`.
     """
-    recording = Recording(
-        name,
-        None,
-        time,
-        {**sample_joints(motion, model.robot, time), **blank_channels(model.sensors, len(time), model.torque)},
-    )
+    spun = wheels or WheelMotion.planned(model.robot.wheels)
+    planned = {**sample_joints(motion, model.robot, time), **spun.speed_channels(time)}
+    recording = Recording(name, None, time, {**planned, **blank_channels(model.sensors, len(time), model.torque)})
     measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
     begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)
     return Manoeuvre(recording, measured, begin, **start)

@@ -1,6 +1,7 @@
 """Spacecraft that execute planned manoeuvres: the interface to the loop, and a simulated implementation.
 
-A plan is a recording with position, velocity and acceleration of every joint at the samples' times, and nothing else.
+A plan is a recording with position, velocity and acceleration of every joint and the speed of every wheel at the
+samples' times, and nothing else.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.predicted_readings import simulate_manoeuvre
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.recording import Recording
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Model
@@ -84,7 +86,9 @@ class PlannedMotion:
         return JointState(*(np.asarray(spline(inside)) for spline in splines))
 
 
-def plan_recording(motion: Motion, robot: Robot, time: Floats, name: str) -> Recording:
+def plan_recording(
+    motion: Motion, robot: Robot, time: Floats, name: str, wheels: WheelMotion | None = None
+) -> Recording:
     """Return a motion as the plan that a spacecraft executes.
 
     Parameters
@@ -96,14 +100,17 @@ def plan_recording(motion: Motion, robot: Robot, time: Floats, name: str) -> Rec
         Times of the samples [s].
     name : str
         Name of the recording.
+    wheels : WheelMotion, optional
+        Motion of the wheels, by default at rest.
     """
+    spun = wheels or WheelMotion.planned(robot.wheels)
     state = motion.evaluate(time)
     channels = {
         f"{family}.{joint.name}": values[:, index]
         for family, values in zip(FAMILIES, state, strict=True)
         for index, joint in enumerate(robot.joints)
     }
-    return Recording(name, None, time, channels)
+    return Recording(name, None, time, {**channels, **spun.speed_channels(time)})
 
 
 @dataclass(frozen=True)
@@ -145,4 +152,5 @@ class SimulatedSpacecraft:
             argument_of_latitude=self.argument_of_latitude,
             rng=np.random.default_rng([self.seed, *plan.name.encode()]) if self.noise else None,
             encoder_sigma=self.encoder_sigma if self.noise else 0.0,
+            wheels=WheelMotion.from_recording(plan, self.truth.robot.wheels),
         )

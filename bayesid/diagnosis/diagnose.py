@@ -152,8 +152,9 @@ def diagnose(
 
 def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bool) -> list[Effect]:
     """Return the candidates that could be at work in some recordings."""
-    wheels = any(f"wheel_momentum.{axis}" in manoeuvre.recording.channels for manoeuvre in manoeuvres for axis in "xyz")
-    longest = max(float(manoeuvre.recording.time[-1]) for manoeuvre in manoeuvres)
+    recordings = [manoeuvre.recording for manoeuvre in manoeuvres]
+    wheels = any(recording.wheels or "wheel_momentum.x" in recording.channels for recording in recordings)
+    longest = max(float(recording.time[-1]) for recording in recordings)
     return candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
 
 

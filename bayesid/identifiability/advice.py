@@ -29,6 +29,7 @@ from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
@@ -192,7 +193,9 @@ def candidates(model: Model) -> list[AddedMeasurement]:
         AddedMeasurement(
             "torque", f"known torque of {torque:g} N m about {each}", partial(_with_pulses, np.array([0.0, torque]))
         ),
-        AddedMeasurement("wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun_up, spin)),
+        AddedMeasurement(
+            "wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun_up, model.robot, spin)
+        ),
         AddedMeasurement("twice", "every manoeuvre flown twice", lambda experiment: replace(experiment, times=2)),
         *(
             AddedMeasurement(
@@ -245,15 +248,22 @@ def _with_wrench(manoeuvre: Manoeuvre, size: Floats) -> Manoeuvre:
     return _with_channels(manoeuvre, {"base_force": rows[:, :3], "base_torque": rows[:, 3:]})
 
 
-def _spun_up(size: float, experiment: Experiment) -> Experiment:
-    return replace(experiment, manoeuvres=tuple(_with_wheels(flown, size) for flown in experiment.manoeuvres))
+def _spun_up(robot: Robot, size: float, experiment: Experiment) -> Experiment:
+    return replace(experiment, manoeuvres=tuple(_with_wheels(robot, flown, size) for flown in experiment.manoeuvres))
 
 
-def _with_wheels(manoeuvre: Manoeuvre, size: float) -> Manoeuvre:
+def _with_wheels(robot: Robot, manoeuvre: Manoeuvre, size: float) -> Manoeuvre:
+    """Return the manoeuvre with pulses of the wheels, of the robot's own one after the other where it has some."""
     recording = manoeuvre.recording
     ends = np.array(PARTS) * recording.time[-1]
     phase = (recording.time[:, None] - ends[:3]) / np.diff(ends)
     bump = size * np.sin(np.pi * np.clip(phase, 0.0, 1.0)) ** 2
+    if robot.wheels:
+        speeds = WheelMotion.from_recording(recording, robot.wheels).speed_channels(recording.time)
+        for index, (wheel, column) in enumerate(zip(robot.wheels, speeds, strict=True)):
+            speeds[column] = speeds[column] + bump[:, index % 3] / wheel.inertia
+        spun = Recording(recording.name, recording.file, recording.time, {**recording.channels, **speeds})
+        return replace(manoeuvre, recording=spun)
     momentum = Actions.from_recording(recording).wheels(recording.time)[0] + bump
     return _with_channels(manoeuvre, {"wheel_momentum": momentum})
 

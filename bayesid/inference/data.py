@@ -19,6 +19,7 @@ from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening
 from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.recording import Recording
+from bayesid.recording.wheel_motion import WheelMotion, check_wheels
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.effects.joint_friction import STANDSTILL, JointFriction
@@ -137,7 +138,7 @@ def grids_of(
                 step,
                 orbit=model.orbit,
                 argument_of_latitude=manoeuvre.argument_of_latitude,
-                actions=Actions.from_recording(manoeuvre.recording),
+                actions=Actions.from_recording(manoeuvre.recording, model.robot.wheels),
                 effects=effects,
                 torques=model.torque is not None,
                 speed_errors=model.has_speed_errors,
@@ -231,6 +232,8 @@ class RecordedSamples:
     torque_rows : tuple of integer arrays
         Rows of the grid whose torque is used, for each of those joints; a joint with dry friction is left out while it
         stands still, when its friction is undetermined.
+    wheels : WheelMotion
+        Motion of the wheels.
     """
 
     motion: Motion
@@ -240,6 +243,7 @@ class RecordedSamples:
     series: Mapping[SensorKind, Series]
     torque: Series
     torque_rows: tuple[Integers, ...]
+    wheels: WheelMotion
 
     @classmethod
     def of(cls, model: Model, manoeuvre: Manoeuvre) -> RecordedSamples:
@@ -256,6 +260,7 @@ class RecordedSamples:
             If the recording lacks a declared sensor, has too few samples of it, or ends earlier for a joint.
         """
         recording = manoeuvre.recording
+        check_wheels(recording, model.robot.wheels)
         series = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
         torque: Series = (np.zeros(0), np.zeros((0, 0)))
         if model.torque is not None:
@@ -265,7 +270,8 @@ class RecordedSamples:
             manoeuvre.motion.check_extent(float(time[-1]), recording.file or recording.name)
         rows = np.searchsorted(time, torque[0])
         used = tuple(rows[moving] for moving in _moving(model, manoeuvre.motion, torque[0]))
-        return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used)
+        wheels = WheelMotion.from_recording(recording, model.robot.wheels)
+        return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used, wheels)
 
     def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> RecordedSamples:
         """Return the same samples with other noise of the sensors.
@@ -326,13 +332,17 @@ class RecordedSamples:
         channels += [
             NoiseChannel(sigma, rows, Filter()) for sigma, rows in zip(torque_sigma, self.torque_rows, strict=True)
         ]
-        if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
+        measured = isinstance(self.motion, MeasuredMotion) and bool(robot.joints)
+        if not measured and not robot.wheels:
             empty = np.zeros((0, 3, len(self.time), len(channels)))
             return SampleNoise(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
         torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
         sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
-        covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
-        return SampleNoise(self.time, channels, sensitivity, covariance)
+        lags = min(max(whitening.WINDOWS), len(self.time) - 1)
+        covariance = self.wheels.lag_covariance(self.time, lags)
+        if isinstance(self.motion, MeasuredMotion):
+            covariance = np.concatenate([self.motion.lag_covariance(self.time, lags), covariance])
+        return SampleNoise(self.time, channels, sensitivity[-len(covariance) :], covariance)
 
 
 def first_rate(sensor: Sensor, values: Floats) -> Floats:

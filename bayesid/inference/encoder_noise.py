@@ -21,7 +21,7 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.small_matrices import cross, rotation, tilted
-from bayesid.robot.composite_tables import WIDTH, composite_rows
+from bayesid.robot.composite_tables import ENTRIES, WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
@@ -70,8 +70,9 @@ def joint_sensitivity(
 
     Returns
     -------
-    (joints, 3, T, C) array
-        Change of the columns of `Channels` per unit of joint position, velocity and acceleration.
+    (joints + W, 3, T, C) array
+        Change of the columns of `Channels` per unit of position, velocity and acceleration of each joint, and then of
+        each of the robot's W wheels.
     """
     columns, kinds = list(torques), tuple(sensor.kind for sensor in sensors)
     count, joints = state.position.shape
@@ -91,7 +92,13 @@ def joint_sensitivity(
     rows, beyond = tables(state)
     momentum = np.asarray(_momentum(rows, rate))
     before = _read(kinds, mounted, environment, rows, beyond, momentum, quaternion)
-    result = np.zeros((joints, 3, count, Channels(kinds, tuple(map(str, columns))).count))
+    result = np.zeros((joints + len(robot.wheels), 3, count, Channels(kinds, tuple(map(str, columns))).count))
+
+    def change(after: _Reading) -> Floats:
+        difference = np.asarray(_difference(kinds, before, after))[:count] / STEP
+        sensed = difference.shape[1] - len(robot.joints if columns else ())
+        return difference[:, [*range(sensed), *(sensed + column for column in columns)]]
+
     for joint in range(joints):
         # rotation of the base per unit of joint position, which equals its rate per unit of joint velocity
         turn = np.zeros((length, 3))
@@ -109,9 +116,12 @@ def joint_sensitivity(
             )
             if derivative == 1:
                 turn = (np.asarray(after.rate) - np.asarray(before.rate)) / STEP
-            difference = np.asarray(_difference(kinds, before, after))[:count] / STEP
-            sensed = difference.shape[1] - len(robot.joints if columns else ())
-            result[joint, derivative] = difference[:, [*range(sensed), *(sensed + column for column in columns)]]
+            result[joint, derivative] = change(after)
+    for number, wheel in enumerate(robot.wheels, start=joints):
+        for derivative, entry in ((1, "spin"), (2, "spin_rate")):
+            spun = np.array(rows)
+            spun[:, ENTRIES[entry]] += STEP * wheel.inertia * np.asarray(wheel.axis)
+            result[number, derivative] = change(_read(kinds, mounted, environment, spun, beyond, momentum, quaternion))
     return result
 
 

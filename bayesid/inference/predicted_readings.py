@@ -17,6 +17,7 @@ from bayesid.inference.integration_step import integration_error, simulate_padde
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion, sample_joints
 from bayesid.recording.recording import Recording
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Coloured, Sensor, SensorKind
@@ -209,6 +210,7 @@ def simulate_manoeuvre(
     argument_of_latitude: float = 0.0,
     rng: np.random.Generator | None = None,
     encoder_sigma: float = 0.0,
+    wheels: WheelMotion | None = None,
 ) -> Recording:
     """Simulate a planned manoeuvre with the bodies of a model at their prior's centre.
 
@@ -227,9 +229,12 @@ def simulate_manoeuvre(
         Source of the noise of sensors and encoders; without it there is no noise.
     encoder_sigma : float
         Standard deviation of the noise of the recorded joint positions [rad or m].
+    wheels : WheelMotion, optional
+        Motion of the wheels, by default at rest.
     """
-    joints = sample_joints(motion, model.robot, time)
-    planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time), model.torque)})
+    joints, spun = sample_joints(motion, model.robot, time), wheels or WheelMotion.planned(model.robot.wheels)
+    channels = {**joints, **spun.speed_channels(time), **blank_channels(model.sensors, len(time), model.torque)}
+    planned = Recording(name, None, time, channels)
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
     posterior = Posterior.of(model, [Manoeuvre(planned, motion, start, argument_of_latitude=argument_of_latitude)])
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]

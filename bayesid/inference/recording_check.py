@@ -11,7 +11,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.recording import JOINT_FAMILIES, Recording
+from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
 from bayesid.recording.suspect_readings import SuspectReadings, suspect_readings
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
@@ -231,6 +231,7 @@ def _unused(recording: Recording, model: Model) -> tuple[str, ...]:
 def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:
     series = [(sensor.kind.value, recording.series(sensor.kind.columns[0])[0]) for sensor in model.sensors]
     joints = [f"{family}.{joint.name}" for joint in model.robot.joints for family in JOINT_FAMILIES]
+    joints += [f"{WHEEL_SPEED}.{wheel.name}" for wheel in model.robot.wheels]
     series += [(name, recording.series(name)[0]) for name in joints if name in recording.channels]
     return tuple(
         ChannelSampling(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max()))

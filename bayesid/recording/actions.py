@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.recording import Recording
+from bayesid.recording.sampled_curve import SampledCurve
+from bayesid.recording.wheel_motion import WheelMotion
+from bayesid.robot.wheel import Wheel
 
 __all__ = ["Actions"]
 
@@ -27,25 +30,36 @@ class Actions:
         Times of the samples of the momentum [s].
     wheel_momentum : (m, 3) array
         Momentum of the wheels, base axes [N m s].
+    spun : WheelMotion, optional
+        Wheels whose speed is known, and whose momentum is added to the other.
     """
 
     time: Floats
     wrench: Floats
     wheel_time: Floats
     wheel_momentum: Floats
+    spun: WheelMotion = field(default_factory=WheelMotion)
 
     @classmethod
-    def none(cls) -> Actions:
-        """Return no actions."""
-        return cls(np.zeros(0), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 3)))
+    def none(cls, spun: WheelMotion | None = None) -> Actions:
+        """Return no actions but the motion of wheels, if that is given."""
+        return cls(np.zeros(0), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 3)), spun or WheelMotion())
 
     @classmethod
-    def from_recording(cls, recording: Recording) -> Actions:
-        """Return the actions that a recording holds; those that it lacks are zero."""
+    def from_recording(cls, recording: Recording, rotors: Sequence[Wheel] = ()) -> Actions:
+        """Return the actions that a recording holds; those that it lacks are zero.
+
+        Parameters
+        ----------
+        recording : Recording
+        rotors : sequence of Wheel, optional
+            Wheels of the robot, all of which are recorded.
+        """
         series = [_vector(recording, family) for family in ("base_force", "base_torque")]
         time = np.unique(np.concatenate([t for t, _ in series]))
         wrench = np.concatenate([_zero_order_hold(t, values, time) for t, values in series], axis=1)
-        return cls(time, wrench, *_vector(recording, "wheel_momentum"))
+        spun = WheelMotion.from_recording(recording, rotors)
+        return cls(time, wrench, *_vector(recording, "wheel_momentum"), spun)
 
     def zero_order_hold(self, time: Floats) -> Floats:
         """Return the wrench that is held at the times (T,), shape (T, 6); it is zero before the first sample."""
@@ -54,20 +68,10 @@ class Actions:
     def wheels(self, time: Floats) -> tuple[Floats, Floats]:
         """Return the momentum of the wheels and its derivative at the times (T,), each of shape (T, 3).
 
-        The momentum follows a modified Akima spline, a line between two samples, and a single sample is held.
+        A recorded momentum follows a curve through its samples (`SampledCurve`).
         """
-        if len(self.wheel_time) == 0:
-            return np.zeros((len(time), 3)), np.zeros((len(time), 3))
-        if len(self.wheel_time) == 1:
-            return np.broadcast_to(self.wheel_momentum[0], (len(time), 3)), np.zeros((len(time), 3))
-        if len(self.wheel_time) == 2:
-            (begin, end), (first, second) = self.wheel_time, self.wheel_momentum
-            share, between = np.clip((time - begin) / (end - begin), 0.0, 1.0), (time >= begin) & (time <= end)
-            slope = (second - first) / (end - begin)
-            return first + share[:, None] * (second - first), between[:, None] * slope
-        curve = Akima1DInterpolator(self.wheel_time, self.wheel_momentum, method="makima")
-        inside = np.clip(time, self.wheel_time[0], self.wheel_time[-1])
-        return curve(inside), curve.derivative()(inside)
+        curve, (momentum, torque) = SampledCurve(self.wheel_time, self.wheel_momentum), self.spun.momentum(time)
+        return momentum + curve.at(time), torque + curve.at(time, 1)
 
 
 def _vector(recording: Recording, family: str) -> tuple[Floats, Floats]:

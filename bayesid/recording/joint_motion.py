@@ -18,14 +18,11 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.recording import Recording
-from bayesid.recording.smoothing import JointSamples, SmoothedJoint
+from bayesid.recording.smoothing import EXTENDED, JointSamples, SmoothedJoint
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
 __all__ = ["Excitation", "MeasuredMotion", "Motion", "check_joints"]
-
-
-EXTENDED = 3.0  # sample intervals by which the smoothed motion of a joint is extended at most beyond its samples
 
 
 class Motion(Protocol):

@@ -24,7 +24,7 @@ from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.recording.time_column import calendar_seconds, refuse_other_units, typed_seconds
 
-__all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording", "declare_family"]
+__all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "WHEEL_SPEED", "Recording", "declare_family"]
 
 Array = Floats
 
@@ -110,6 +110,12 @@ class Recording:
         """Joints whose position, velocity or acceleration is recorded, in the order of the columns."""
         names = (column.partition(".") for column in self.channels)
         return tuple(dict.fromkeys(joint for family, _, joint in names if family in JOINT_FAMILIES[:3]))
+
+    @property
+    def wheels(self) -> tuple[str, ...]:
+        """Wheels whose speed is recorded, in the order of the columns."""
+        names = (column.partition(".") for column in self.channels)
+        return tuple(wheel for family, _, wheel in names if family == WHEEL_SPEED)
 
     def series(self, name: str) -> tuple[Array, Array]:
         """Return the samples of one channel without the missing ones.
@@ -240,6 +246,12 @@ class Recording:
             if family in ("acceleration", "torque") and not measured:
                 remedy = f"Add position.{joint} or velocity.{joint}"
                 raise self._error(f"joint '{joint}' has neither position nor velocity", columns=[column], remedy=remedy)
+        if self.wheels and "wheel_momentum.x" in self.channels:
+            raise self._error(
+                "the wheels are recorded twice, by their speeds and by their momentum",
+                columns=["wheel_momentum.x", f"{WHEEL_SPEED}.{self.wheels[0]}"],
+                remedy="Keep the speeds, and describe each wheel under [[robot.wheels]], or keep the momentum alone",
+            )
         for family, axes in VECTOR_FAMILIES.items():
             columns = [f"{family}.{axis}" for axis in axes]
             absent = [column for column in columns if column not in self.channels]
@@ -288,7 +300,7 @@ def _row(file: Path | None, row: int) -> str:
 
 def _is_known(column: str) -> bool:
     family, _, rest = column.partition(".")
-    if family in JOINT_FAMILIES:
+    if family in (*JOINT_FAMILIES, WHEEL_SPEED):
         return bool(rest)
     return column == "time" or rest in VECTOR_FAMILIES.get(family, ())
 
@@ -304,7 +316,7 @@ def _nearest(column: str) -> str:
         near = [f"{name}.{rest}" for name in difflib.get_close_matches(family.lower(), JOINT_FAMILIES, n=1, cutoff=0.5)]
     if near:
         return f"Did you mean '{near[0]}'?"
-    families = ["time", *(f"{name}.<joint>" for name in JOINT_FAMILIES)]
+    families = ["time", *(f"{name}.<joint>" for name in JOINT_FAMILIES), f"{WHEEL_SPEED}.<wheel>"]
     families += [f"{name}.{'|'.join(axes)}" for name, axes in VECTOR_FAMILIES.items()]
     return f"Remove or rename the column. Known ones: {', '.join(families)}"
 
@@ -449,6 +461,9 @@ def _write_parquet(file: Path, columns: Mapping[str, Array]) -> None:
 JOINT_FAMILIES = ("position", "velocity", "acceleration", "torque")
 """Families with one column per joint, such as ``position.<joint>`` [rad, m]; torques are in N m, forces in N."""
 
+WHEEL_SPEED = "wheel_speed"
+"""Family with one column per wheel, ``wheel_speed.<wheel>`` [rad/s]."""
+
 _VECTOR_FAMILIES = {
     "rate": ("x", "y", "z"),
     "accel": ("x", "y", "z"),
@@ -475,6 +490,6 @@ def declare_family(name: str, axes: tuple[str, ...]) -> None:
     InputError
         If the name is taken by columns with other axes.
     """
-    if name in JOINT_FAMILIES or _VECTOR_FAMILIES.get(name, axes) != axes:
+    if name in (*JOINT_FAMILIES, WHEEL_SPEED) or _VECTOR_FAMILIES.get(name, axes) != axes:
         raise InputError(f"columns {name!r} exist with another meaning", remedy="Give the sensor another name")
     _VECTOR_FAMILIES[name] = axes

@@ -23,7 +23,7 @@ from scipy.optimize import minimize, minimize_scalar
 from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.integrated_process import IntegratedProcess, Jump, covariances_by_distance
 
-__all__ = ["ORDERS", "JointSamples", "SmoothedJoint", "smooth"]
+__all__ = ["EXTENDED", "ORDERS", "JointSamples", "SmoothedJoint", "smooth"]
 
 
 ORDERS = (4, 3, 5)
@@ -36,6 +36,8 @@ RELIABLE = 1e-6
 # steps within which a process leaves a polynomial that is rough enough for the information on a jump, which grows with
 # the fifth power of their number, not to be lost in rounding
 HORIZON = 3.0
+# sample intervals by which the smoothed motion is extended at most beyond its samples
+EXTENDED = 3.0
 # fraction of the median step below which two sample times share a node, because the algebra needs separate nodes
 SNAP = 0.02
 
@@ -199,6 +201,19 @@ class SmoothedJoint:
     def evaluate(self, time: Floats) -> Floats:
         """Return position, velocity and acceleration at the times (T,), shape (3, T)."""
         return np.stack([spline(time) for spline in self._splines])
+
+    def derivatives(self, time: Floats, count: int) -> Floats:
+        """Return the position and its first derivatives, (count, T), held beyond a few steps outside of the samples.
+
+        Parameters
+        ----------
+        time : (T,) array
+            Times [s].
+        count : int
+            Number of derivatives, the position counted.
+        """
+        inside = np.clip(time, self.nodes[0] - EXTENDED * self.scale, self.nodes[-1] + EXTENDED * self.scale)
+        return np.stack([self._splines[0](inside, nu=order) for order in range(count)])
 
     @cached_property
     def _splines(self) -> tuple[PPoly, PPoly, PPoly]:

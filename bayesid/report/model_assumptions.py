@@ -54,6 +54,7 @@ def planning_sentences(planned: Posterior | Plan) -> list[str]:
     return [
         *_body_sentences(model),
         _link_sentence(model),
+        *_wheel_sentences(model),
         *_effect_sentences(model),
         _orbit_sentence(model),
         f"The initial attitude is {attitude}.",
@@ -110,6 +111,14 @@ def _link_sentence(model: Model) -> str:
         f"The inertial parameters of {names} are uncertain by a relative width of {width}, which the result accounts "
         "for. The geometry is exact."
     )
+
+
+def _wheel_sentences(model: Model) -> list[str]:
+    wheels = model.robot.wheels
+    if not wheels:
+        return []
+    listed = ", ".join(f"{wheel.name} ({format_number(wheel.inertia)} kg m2)" for wheel in wheels)
+    return [f"Wheels whose speed is known give the base their momentum; at rest they are part of it: {listed}."]
 
 
 def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:

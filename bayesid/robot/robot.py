@@ -23,6 +23,7 @@ from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.mjcf import urdf_of_mjcf
 from bayesid.robot.urdf_tree import BOUNDLESS, prepared_urdf, write_inertial, xml_root
+from bayesid.robot.wheel import Wheel
 
 __all__ = ["Joint", "Link", "Load", "Robot"]
 
@@ -87,6 +88,7 @@ class Robot:
     #: are those in `links`.
     model: pin.Model
     remarks: tuple[str, ...] = ()  #: what the file left open or got wrong, and how it was read
+    wheels: tuple[Wheel, ...] = ()  #: reaction wheels whose speed is recorded; at rest they are part of the base
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content for another process, to which a read-only mapping cannot be sent."""
@@ -224,6 +226,22 @@ class Robot:
         carrier = self.link(load.link)
         links = {**self.links, load.name: Link(load.inertial, carrier.joint, carrier.placement)}
         return replace(self, links=MappingProxyType(links), loads=(*self.loads, load.name))
+
+    def with_wheel(self, wheel: Wheel) -> Robot:
+        """Return the robot with a reaction wheel, whose rotor at rest is part of the base already."""
+        if wheel.name in [other.name for other in self.wheels]:
+            raise InputError(f"two wheels are named {wheel.name!r}", remedy="Give each a name of its own")
+        return replace(self, wheels=(*self.wheels, wheel))
+
+    def wheel_index(self, name: str) -> int:
+        """Return the index of a wheel in `wheels`."""
+        names = [wheel.name for wheel in self.wheels]
+        if name not in names:
+            raise InputError(
+                f"no wheel named {name!r}",
+                remedy=f"Choose one of {', '.join(names)}" if names else "Describe the wheels under [[robot.wheels]]",
+            )
+        return names.index(name)
 
     def perturbed(self, name: str, relative: float, rng: np.random.Generator) -> Robot:
         """Return the robot with one link drawn from its log-Cholesky prior of the given relative width.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats, Traceable
@@ -57,6 +58,9 @@ class Environment(NamedTuple):
         Recorded momentum of the wheels and its derivative, base axes [N m s, N m].
     wrench : (6,) array
         Known force and torque about the base origin, base axes [N, N m].
+    wheels : (W, 5) array
+        Angle, speed and its three derivatives of each wheel whose speed is recorded
+        (`bayesid.recording.wheel_motion.COURSE`).
     """
 
     time: Traceable
@@ -69,6 +73,7 @@ class Environment(NamedTuple):
     wheel_momentum: Traceable
     wheel_torque: Traceable
     wrench: Traceable
+    wheels: Traceable = np.zeros((0, 5))
 
 
 class Instant(NamedTuple):

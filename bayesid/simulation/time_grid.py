@@ -157,7 +157,7 @@ def time_tables(
     state = none if orbit is None else orbit.state(time, argument_of_latitude)
     momentum, torque = actions.wheels(time)
     environment = Environment(
-        time, *state, wheel_momentum=momentum, wheel_torque=torque, wrench=np.zeros((len(time), 6))
+        time, *state, momentum, torque, wrench=np.zeros((len(time), 6)), wheels=actions.spun.courses(time)
     )
     xp = namespace(known, *(table for _, table in tables))
     coefficients = xp.concatenate([np.zeros((len(time), WIDTH, 0)), *(table for _, table in tables)], axis=2)

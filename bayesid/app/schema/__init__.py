@@ -25,6 +25,7 @@ from bayesid.app.schema.study_sections import (
     RecordingSection,
     RobotSection,
     UnknownsSection,
+    WheelSection,
 )
 
 __all__ = [
@@ -45,4 +46,5 @@ __all__ = [
     "SensorsSection",
     "Study",
     "UnknownsSection",
+    "WheelSection",
 ]

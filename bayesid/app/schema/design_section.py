@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Strict, Tag, field_validator, model_validator
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema.value_types import (
@@ -55,6 +56,20 @@ class DesignLimits(Section):
         return band
 
 
+def _ascending_times(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    if not points or any(later[0] <= earlier[0] for earlier, later in pairwise(points)):
+        raise InputError("the times do not ascend", remedy="Give pairs [time, speed] in the order of time")
+    return points
+
+
+Speed = Annotated[
+    Annotated[Number, Tag("number")]
+    | Annotated[tuple[tuple[Number, Number], ...], AfterValidator(_ascending_times), Tag("points")],
+    Discriminator(lambda value: "points" if isinstance(value, (list, tuple)) else "number"),
+]
+"""Speed of a wheel [rad/s], or pairs of time [s] and speed."""
+
+
 class DesignSection(Section):
     """Section ``[design]``, the manoeuvre to design.
 
@@ -83,6 +98,9 @@ class DesignSection(Section):
         Parameters of the criteria that have some, such as those of a plugin.
     rivals : sequence of str, optional
         Labels of the effects to distinguish, for the criterion "separation".
+    wheel_speed : table of wheel to float or list of pairs, optional
+        Speed of a wheel during the manoeuvre [rad/s], or times [s] and speeds through which it goes; by default at
+        rest.
     attitude : (4,), optional
         Initial attitude, a quaternion from base to orbit axes.
     attitude_sigma : float, optional
@@ -102,6 +120,7 @@ class DesignSection(Section):
     criteria: Annotated[tuple[Name, ...], Field(min_length=1), AfterValidator(distinct)] | None = None
     options: Mapping[Name, Mapping[Name, bool | int | float | str]] = Field(default_factory=dict)
     rivals: Names = ()
+    wheel_speed: Mapping[Name, Speed] = Field(default_factory=dict)
     attitude: Quaternion = (0.0, 0.0, 0.0, 1.0)
     attitude_sigma: Annotated[NonNegative, no_more_than(math.pi, "Radians, not arcsec or degrees?")] = 0.0
     argument_of_latitude: Annotated[Number, FULL_TURN] = 0.0

@@ -256,6 +256,26 @@ class LoadSection(BodySection):
     link: Name
 
 
+class WheelSection(Section):
+    """Section ``[[robot.wheels]]``, a reaction wheel whose speed is recorded as ``wheel_speed.NAME``.
+
+    Parameters
+    ----------
+    name : str
+    axis : (3,)
+        Unit vector of its axis, base axes.
+    inertia : float
+        Moment of inertia about the axis, part of the base's inertia at rest [kg m2].
+    position : (3,), optional
+        Centre in the base, where an imbalance acts, by default the base origin [m].
+    """
+
+    name: Name
+    axis: UnitVector
+    inertia: Annotated[Positive, no_more_than(100.0, "Is it in kg m2?")]
+    position: Position = (0.0, 0.0, 0.0)
+
+
 class RobotSection(Section):
     """Section ``[robot]``, the robot and its loads.
 
@@ -269,18 +289,21 @@ class RobotSection(Section):
         Whether links whose inertia no rigid body can have take the nearest that one can; by default they are refused.
     loads : sequence of LoadSection, optional
         Bodies that are fixed to links.
+    wheels : sequence of WheelSection, optional
+        Reaction wheels whose speed is recorded.
     """
 
     urdf: File
     nearest_physical: bool = False
     link_spread: Annotated[NonNegative, no_more_than(1.0, "A fraction, not a percentage: 0.05 is 5 %")] = 0.0
     loads: Annotated[tuple[LoadSection, ...], BeforeValidator(array_of_tables)] = ()
+    wheels: Annotated[tuple[WheelSection, ...], BeforeValidator(array_of_tables)] = ()
 
-    @field_validator("loads")
+    @field_validator("loads", "wheels")
     @classmethod
-    def _distinct_names(cls, loads: tuple[LoadSection, ...]) -> tuple[LoadSection, ...]:
-        distinct(tuple(load.name for load in loads))
-        return loads
+    def _distinct_names(cls, named: tuple[LoadSection | WheelSection, ...]) -> tuple[LoadSection | WheelSection, ...]:
+        distinct(tuple(section.name for section in named))
+        return named
 
 
 class OrbitSection(Section):

@@ -5,6 +5,7 @@ from studies.truth.motions import Manoeuvres, Motion, smooth_motion
 from studies.truth.mujoco.model import TruthModel, rollout
 from studies.truth.mujoco.parts import (
     Appendage,
+    DrivenWheel,
     Field,
     Flexibility,
     Mover,
@@ -26,7 +27,8 @@ from studies.truth.mujoco.study import Hidden, Study, write_study
 from studies.truth.orbit import EARTH_FIELD, EARTH_RADIUS, MU, Orbit
 from studies.truth.recordings import Distortion, Sensors, Spoiling, Truth
 
-__all__ = ["EARTH_FIELD", "EARTH_RADIUS", "MU", "Appendage", "Body", "Distortion", "Field", "Flexibility", "Hidden"]
+__all__ = ["EARTH_FIELD", "EARTH_RADIUS", "MU", "Appendage", "Body", "Distortion", "DrivenWheel"]
+__all__ += ["Field", "Flexibility", "Hidden"]
 __all__ += ["Manoeuvres", "Motion", "Mover", "Orbit", "Rotor", "Sensors", "Spoiling", "SpunWheel", "Study", "Thrust"]
 __all__ += ["Truth", "TruthModel", "braking", "drag", "join", "leak", "magnet", "nearby", "outer_torque", "panel"]
 __all__ += ["pulses", "read_body", "rollout", "rotation_from_rpy", "slosh", "smooth_motion", "snap", "sunlight"]

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from studies.truth.bodies import Body, Description, join, read_urdf
 from studies.truth.motions import Motion
-from studies.truth.mujoco.parts import Appendage, Field, Flexibility, Mover, Rotor, Thrust
+from studies.truth.mujoco.parts import Appendage, DrivenWheel, Field, Flexibility, Mover, Rotor, Thrust
 from studies.truth.numerics import Array, cross, runge_kutta_step, substeps
 from studies.truth.orbit import Orbit
 from studies.truth.recordings import Truth
@@ -108,6 +108,7 @@ class TruthModel:
     movers : sequence of Mover
     changed : mapping; links -> what is really there in place of the URDF's
     flexible : sequence of Flexibility
+    wheels : sequence of DrivenWheel
     configuration : (joints,) array_like, optional
         Joint positions at which the stiffness of flexible joints is set, in the order of the URDF; zero by default.
     """
@@ -125,12 +126,13 @@ class TruthModel:
         movers: Sequence[Mover] = (),
         changed: Mapping[str, Body] | None = None,
         flexible: Sequence[Flexibility] = (),
+        wheels: Sequence[DrivenWheel] = (),
         configuration: ArrayLike | None = None,
     ) -> None:
         robot = read_urdf(urdf)
         self.joints = tuple(joint.name for joint in robot.moving)
         self.orbit, self.thrusts, self.rotor = orbit, tuple(thrusts), rotor
-        self.fields, self.movers = tuple(fields), tuple(movers)
+        self.fields, self.movers, self.wheels = tuple(fields), tuple(movers), tuple(wheels)
         changed, springs = dict(changed or {}), {f.joint: f for f in flexible}
         links = set(robot.links) - {robot.base}
         for kind, names, known in (("link", set(changed), links), ("joint", set(springs), set(self.joints))):
@@ -138,7 +140,7 @@ class TruthModel:
                 raise ValueError(f"no {kind} {sorted(names - known)} to change; there are {sorted(known)}")
         base = robot.bodies[robot.base]
         hidden: list[Appendage | Mover] = [*appendages, *movers]
-        at_rest = ([] if rotor is None else [rotor.body]) + [part.body for part in hidden]
+        at_rest = ([] if rotor is None else [rotor.body]) + [part.body for part in (*hidden, *wheels)]
         self.base = join(base, *at_rest)
         """Base body with all that is fixed on it when nothing moves: what identification should return."""
 
@@ -155,6 +157,10 @@ class TruthModel:
             added = spec_base.add_body(name="rotor")
             _set_inertial(added, rotor.body)
             added.add_joint(name="rotor", type=mujoco.mjtJoint.mjJNT_HINGE, axis=rotor.axis, pos=rotor.position)
+        for index, wheel in enumerate(wheels):
+            added = spec_base.add_body(name=f"wheel{index}")
+            _set_inertial(added, wheel.body)
+            added.add_joint(name=f"wheel{index}", type=JOINT_TYPES["revolute"], axis=wheel.axis, pos=wheel.position)
         for index, appendage in enumerate(appendages):
             _add_appendage(spec_base, f"appendage{index}", appendage)
         for index, mover in enumerate(movers):
@@ -185,6 +191,7 @@ class TruthModel:
         """Find where driven and free degrees of freedom stand in MuJoCo's vectors."""
         names = self.joints + (() if self.rotor is None else ("rotor",))
         names += tuple(f"mover{index}" for index in range(len(self.movers)))
+        names += tuple(f"wheel{index}" for index in range(len(self.wheels)))
         joints = [self.model.joint(name) for name in names]
         self.driven_q = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self.driven_v = np.array([joint.dofadr[0] for joint in joints], dtype=int)
@@ -201,6 +208,7 @@ class TruthModel:
             spin = float(np.linalg.norm(self.rotor.momentum)) / self.rotor.spin_inertia
             extra.append((spin * time, spin, 0.0))
         extra += [mover.motion(time) for mover in self.movers]
+        extra += [wheel.course(time) for wheel in self.wheels]
         if not extra:
             return arm
         position, speed, acceleration = (np.append(a, b) for a, b in zip(arm, zip(*extra, strict=True), strict=True))

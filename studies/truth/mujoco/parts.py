@@ -36,6 +36,33 @@ class Rotor:
 
 
 @dataclass(frozen=True)
+class DrivenWheel:
+    """A wheel in the base whose angle, speed and acceleration relative to it are prescribed.
+
+    At angle zero it counts as part of the base. An imbalance is given as it lies at angle zero, base axes: `static` is
+    the first moment of mass about the axis [kg m], `dynamic` the momentum across the axis per speed [kg m2].
+    """
+
+    axis: tuple[float, float, float]
+    spin_inertia: float
+    course: Callable[[float], tuple[float, float, float]]
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float = 0.1
+    static: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    dynamic: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def body(self) -> Body:
+        """The wheel at angle zero, base axes."""
+        axis, across = np.array(self.axis), 0.6 * self.spin_inertia
+        tensor = across * np.eye(3) + (self.spin_inertia - across) * np.outer(axis, axis)
+        tensor += np.outer(axis, self.dynamic) + np.outer(self.dynamic, axis)
+        offset = np.array(self.static) / self.mass
+        about_com = tensor - self.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+        return Body(self.mass, np.array(self.position) + offset, about_com)
+
+
+@dataclass(frozen=True)
 class Appendage:
     """A body on the base with joints held by springs, which no recording shows: a solar panel, a tank of fuel."""
 
