@@ -30,6 +30,7 @@ TERMS = "Terms. "
 """How the small print at the foot of the last page begins, which stands under a line and does not count either."""
 
 STYLES = {
+    "an invisible character": re.compile("[\u200b-\u200d\u2060\ufeff]"),
     "a power of ten as computers print it": re.compile(r"\d[eE][+-]?\d"),
     "a hyphen as a minus sign": re.compile(r"(?<![\w.,)/=^\]-])-\d"),
     "a unit with a power that is not raised": re.compile(

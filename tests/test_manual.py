@@ -22,6 +22,7 @@ from bayesid.report.effect_catalogue import catalogue
 from bayesid.simulation.effects.register import known_effects
 from studies import manual
 from tests.pdf_text import PdfText
+from tests.report_rules import badly_written
 
 ROOT = Path(__file__).resolve().parents[1]
 CONTRACT = ROOT.parent / "shared" / "CONTRACT.md"
@@ -58,6 +59,10 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> PdfText:
     file = tmp_path_factory.mktemp("manual") / "manual.pdf"
     manual.run(file)
     return PdfText.read(file)
+
+
+def test_names_can_be_copied_out_of_the_manual(text):
+    assert not any("invisible" in found for page in text.pages for found in badly_written(page))
 
 
 def results() -> set[str]:

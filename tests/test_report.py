@@ -42,6 +42,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 from tests.pdf_text import PdfText
+from tests.report_rules import badly_written
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -113,6 +114,7 @@ def test_document_with_every_element(tmp_path):
     document.write(str(tmp_path / "b.pdf"))
     text = PdfText.read(tmp_path / "a.pdf")
     assert len(text.pages) >= 4
+    assert not any("invisible" in found for page in text.pages for found in badly_written(page))
     for number, hostile in enumerate(HOSTILE[:3], start=1):
         assert f"{number} {hostile} {hostile}" in text  # a heading and its paragraph
         assert text.row(hostile, "a_very.long-name/without:any.space" * 5)

@@ -214,11 +214,12 @@ def literal(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    """Return the literal of a table's cell, whose long words may break after their punctuation."""
-    words = (
-        re.sub(r"([._/:\-])(?=\w)", "\\1\u200b", word) if len(word) >= LONG_WORD else word for word in text.split(" ")
-    )
-    return literal(" ".join(words))
+    """Return the Typst expression of a table's cell, whose long words may break after their punctuation.
+
+    An empty box allows the break: a zero-width space would be copied with the text.
+    """
+    parts = re.sub(rf"\S{{{LONG_WORD},}}", lambda word: re.sub(r"([._/:\-])(?=\w)", "\\1\0", word[0]), text).split("\0")
+    return f"({', '.join(map(literal, parts))},).join(box())" if len(parts) > 1 else literal(text)
 
 
 def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Sequence[str]) -> None:
