@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bayesid._io.words import counted
 from bayesid.app.options import Output, StudyFile
 
 __all__ = ["run"]
@@ -24,7 +25,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     result = check(study)
     posterior = result.posterior
     count = len(posterior.manoeuvres)
-    yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
+    yield f"{study.title}: {counted(count, 'recording')}, {posterior.samples} samples, {posterior.size} unknowns."
     yield from open_places(study)
     yield from posterior.model.robot.remarks
     with complete_folder(output) as folder:

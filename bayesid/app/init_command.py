@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from bayesid._io.errors import InputError
+from bayesid._io.words import counted
 
 __all__ = ["run"]
 
@@ -46,6 +47,6 @@ def run(
     create_folder(output.parent)
     write_text(output, text)
     yield from known.remarks
-    yield f"Matched {len(known.joints)} joints of {known.name} in {len(read)} recordings."
+    yield f"Matched {counted(len(known.joints), 'joint')} of {known.name} in {counted(len(read), 'recording')}."
     yield f"Wrote {output}, with {text.count(CHECK)} places marked `{CHECK}`."
     yield f"Next: bayesid check {output} --output {output.with_name(output.stem + '-check')}"

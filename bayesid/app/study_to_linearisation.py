@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesid._io.words import counted
 from bayesid.app.schema import Study
 from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
 from bayesid.app.study_to_model import load_manoeuvres, load_model
@@ -111,7 +112,7 @@ def _predicted(
 
 
 def _count(manoeuvres: Sequence[Manoeuvre]) -> str:
-    return "1 recording" if len(manoeuvres) == 1 else f"{len(manoeuvres)} recordings"
+    return counted(len(manoeuvres), "recording")
 
 
 def lacking_sensors(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:

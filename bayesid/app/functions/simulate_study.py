@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.words import counted
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_linearisation import lacking_sensors, planned_manoeuvres
 from bayesid.app.study_to_model import load_manoeuvres, load_model
@@ -63,7 +64,7 @@ class Simulation:
     def __str__(self) -> str:
         """Return a sentence on what was simulated, and how accurately."""
         return (
-            f"Simulated {len(self.recordings)} recordings; integration step {self.posterior.step:g} s, "
+            f"Simulated {counted(len(self.recordings), 'recording')}; integration step {self.posterior.step:g} s, "
             f"error {self.integration_error:.2g} sigma."
         )
 

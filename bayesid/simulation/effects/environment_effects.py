@@ -228,7 +228,7 @@ class AerodynamicDrag(_Pressure):
 class SolarPressure(_Pressure):
     """Constant radiation pressure from the Sun's direction, at a centre of pressure beside the centre of mass.
 
-    The prior's median of 0.3 mN is that of 45 square metres of absorbing panel; its spread of 2 in the logarithm stands
+    The prior's median of 0.3 mN is that of 66 square metres of absorbing panel; its spread of 2 in the logarithm stands
     for area and reflection.
     """
 
