@@ -13,8 +13,6 @@ Names are loaded when they are first used (PEP 562), so that the import itself c
 from __future__ import annotations
 
 import importlib
-import os
-import sys
 import warnings
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -165,11 +163,6 @@ _NAMES = {
 
 _PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
-# JAX computes in 64 bits; set without importing it
-if "jax" in sys.modules:
-    sys.modules["jax"].config.update("jax_enable_x64", True)
-else:
-    os.environ["JAX_ENABLE_X64"] = "True"
 # the pinned ArviZ announces its successor at every import
 warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=FutureWarning)
 

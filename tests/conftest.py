@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
+import jax
 import numpy as np
 import pytest
 
@@ -49,6 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
     given = os.environ.get("XLA_FLAGS", "")
     if not (config.getoption("--slow") or config.getoption("--catalogue") or QUICKLY in given):
         os.environ["XLA_FLAGS"] = f"{QUICKLY} {given}"
+    jax.config.update("jax_enable_x64", True)  # for what the tests themselves compute with JAX
     _take_one_core()
     if COMPILED not in os.environ:
         folder = tempfile.TemporaryDirectory()

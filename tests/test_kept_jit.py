@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from bayesid._math import kept_jit as module
-from bayesid._math.kept_jit import forget_executables, kept_jit, quick_jit
+from bayesid._math.kept_jit import QuickJit, forget_executables, kept_jit
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
 from bayesid.simulation.sensors import SensorKind
@@ -177,7 +177,7 @@ def test_options_that_the_installed_xla_refuses_are_left_out(folder, monkeypatch
         taken = module.compiler_options()
         assert set(taken) < set(module.QUICKLY)
         assert "xla_cpu_parallel_codegen_split_count" in taken, "all versions from 0.10 to 0.12 take it"
-        assert float(quick_jit(lambda x: 2.0 * x)(3.0)) == 6.0
+        assert float(QuickJit(lambda x: 2.0 * x)(3.0)) == 6.0
         assert float(scaled(10, X)) == 28.0
     finally:
         module.compiler_options.cache_clear()

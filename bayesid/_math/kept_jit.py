@@ -33,9 +33,10 @@ from jax.experimental import serialize_executable
 from jax.stages import Compiled
 
 from bayesid._io.files import complete_file
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.memory import give_back_memory
 
-__all__ = ["OBTAINED", "forget_executables", "kept_jit", "quick_jit"]
+__all__ = ["OBTAINED", "QuickJit", "forget_executables", "kept_jit"]
 
 PACKAGE = __name__.partition(".")[0]
 OBTAINED = "/bayesid/executable"
@@ -68,9 +69,21 @@ def compiler_options() -> dict[str, bool | int]:
     return {name: value for name, value in QUICKLY.items() if is_taken(name)}
 
 
-def quick_jit(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function compiled as by `jax.jit`, in less time; it cannot be part of another compiled function."""
-    return jax.jit(function, compiler_options=compiler_options())
+class QuickJit:
+    """A function compiled as by `jax.jit`, in 64 bits and in less time, which no other compiled one may call."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._jit = jax.jit(function, compiler_options=compiler_options())
+
+    @in_double_precision
+    def __call__(self, *args: Any) -> Any:
+        """Evaluate the function."""
+        return self._jit(*args)
+
+    @in_double_precision
+    def trace(self, *args: Any) -> None:
+        """Do what comes before the compilation for such arguments."""
+        self._jit.lower(*args)
 
 
 @runtime_checkable
@@ -83,7 +96,7 @@ class _Describable(Protocol):
 
 
 def kept_jit(static: int = 0) -> Callable[[Callable[..., Any]], _KeptJit]:
-    """Return a decorator that compiles a function as `jax.jit` does and keeps the result in the folder of JAX's cache.
+    """Return a decorator that compiles a function in 64 bits and keeps the result in the folder of JAX's cache.
 
     Parameters
     ----------
@@ -141,8 +154,9 @@ class _KeptJit:
         update_wrapper(self, function)
         _known.add(self)
 
+    @in_double_precision
     def __call__(self, *args: Any) -> Any:
-        """Evaluate the function."""
+        """Evaluate the function in 64 bits."""
         static, others = args[: self._static], args[self._static :]
         leaves, tree = jax.tree.flatten(others)
         if any(isinstance(leaf, Tracer) for leaf in leaves):
@@ -262,8 +276,7 @@ def _surroundings() -> str:
     device = jax.devices()[0]
     versions = (jax.__version__, jaxlib.__version__, sys.version_info[:2])
     machine = (device.platform, device.device_kind, os.cpu_count(), sorted(set(flags)))
-    options = (os.environ.get("XLA_FLAGS"), _setting("jax_enable_x64"))
-    return repr((digest.hexdigest(), versions, machine, options))
+    return repr((digest.hexdigest(), versions, machine, os.environ.get("XLA_FLAGS")))
 
 
 def _setting(name: str) -> Any:

@@ -14,6 +14,7 @@ import errno
 import gc
 import importlib
 import inspect
+import os
 import pkgutil
 import sys
 from collections.abc import Callable, Iterator
@@ -148,7 +149,8 @@ for _module in pkgutil.iter_modules(bayesid.app.__path__):
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line, in whose process all that JAX computes has 64 bits."""
+    os.environ["JAX_ENABLE_X64"] = "True"  # files of the user may compute with JAX when they are imported or executed
     take_large_arrays_singly()
     gc.set_threshold(SELDOM)
     atexit.register(gc.freeze)  # what the process leaves is not searched for cycles

@@ -35,6 +35,10 @@ def run_user_file(file: Path, place: str, remedy: str) -> ModuleType:
     InputError
         If there is no such Python file, or it fails.
     """
+    from bayesid._math.double_precision import (
+        in_double_precision,  # JAX, which a study without such files need not load
+    )
+
     name = f"bayesid_user_{file.stem}"
     spec = importlib.util.spec_from_file_location(name, file)
     if not file.is_file() or spec is None or spec.loader is None:
@@ -42,7 +46,7 @@ def run_user_file(file: Path, place: str, remedy: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look up the types of their fields there
     with _blamed(file):
-        spec.loader.exec_module(module)
+        in_double_precision(spec.loader.exec_module)(module)
     return module
 
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.kept_jit import quick_jit
+from bayesid._math.double_precision import in_double_precision
+from bayesid._math.kept_jit import QuickJit
 from bayesid.design.criteria import Criterion
 from bayesid.design.encoder_information import Encoder, encoder_directions, likely_directions, position_noise
 from bayesid.design.flight import Flight, Outcome
@@ -129,6 +130,7 @@ class Problem:
         return encoder_directions(self.plan, parameters, rate)
 
     @cached_property
+    @in_double_precision
     def limit_of_fraction(self) -> Integers:
         """Index of the limit to which each of `fractions` belongs."""
         shape = jax.eval_shape(
@@ -199,17 +201,17 @@ class Problem:
         if "_latest" in self.__dict__:
             return
         parameters, likely = self.plan.family.centre, likely_directions(self.plan)
-        costs: list[Any] = [self._informed_cost for one in self.criteria if one.informed][:1]
+        costs: list[QuickJit] = [self._informed_cost for one in self.criteria if one.informed][:1]
         costs += [self._motion_cost for one in self.criteria if not one.informed][:1]
         arguments: tuple[Any, ...] = (parameters, self.centre, 0, self.precision, likely)
         pending: list[Future[Any]] = []
         with ThreadPoolExecutor() as pool:
             for cost in costs:
-                cost.lower(*arguments)
+                cost.trace(*arguments)
                 pending.append(pool.submit(cost, *arguments))
-            self._fractions.lower(parameters, self.centre, self.bounds)
+            self._fractions.trace(parameters, self.centre, self.bounds)
             pending.append(pool.submit(self.fractions, parameters))
-            self._fine_trajectory.lower(parameters, self.centre)
+            self._fine_trajectory.trace(parameters, self.centre)
             pending.append(pool.submit(lambda: (self.trajectory(parameters), self.explained)))
             for future in pending:
                 future.result()
@@ -336,7 +338,7 @@ class Problem:
     # ---- compiled ----
 
     @cached_property
-    def _informed_cost(self):  # type: ignore[no-untyped-def]
+    def _informed_cost(self) -> QuickJit:
         """Criteria that depend on the information, compiled."""
 
         def cost(parameters: Array, z: Array, index: Array, prior: Array, explained: Array) -> Array:
@@ -345,10 +347,10 @@ class Problem:
             flight.prepare()
             return self._chosen(True, flight, index, information, prior)
 
-        return quick_jit(jax.value_and_grad(cost))
+        return QuickJit(jax.value_and_grad(cost))
 
     @cached_property
-    def _motion_cost(self):  # type: ignore[no-untyped-def]
+    def _motion_cost(self) -> QuickJit:
         """All other criteria, compiled."""
 
         def cost(parameters: Array, z: Array, index: Array, prior: Array, explained: Array) -> Array:
@@ -356,7 +358,7 @@ class Problem:
             flight.prepare()
             return self._chosen(False, flight, index, jnp.zeros_like(prior), prior)
 
-        return quick_jit(jax.value_and_grad(cost))
+        return QuickJit(jax.value_and_grad(cost))
 
     def _chosen(self, informed: bool, flight: Flight, index: Array, information: Array, prior: Array) -> Array:
         """Return the cost by one of the criteria that depend on the information, or of the others."""
@@ -368,7 +370,7 @@ class Problem:
         return jax.lax.switch(index, branches, information)
 
     @cached_property
-    def _fractions(self):  # type: ignore[no-untyped-def]
+    def _fractions(self) -> QuickJit:
         def fractions(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
             flight = Flight(self.plan, parameters, z)
             (time, *motion), (_, *slopes) = flight.trajectory_and_slopes()
@@ -383,9 +385,9 @@ class Problem:
 
             return values(*motion), jax.vmap(along, -1, -1)(*slopes)
 
-        return quick_jit(fractions)
+        return QuickJit(fractions)
 
     @cached_property
-    def _fine_trajectory(self):  # type: ignore[no-untyped-def]
+    def _fine_trajectory(self) -> QuickJit:
         fine = replace(self.plan, step=self.plan.step / FINER)
-        return quick_jit(lambda parameters, z: Flight(fine, parameters, z).trajectory())
+        return QuickJit(lambda parameters, z: Flight(fine, parameters, z).trajectory())

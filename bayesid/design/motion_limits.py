@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bayesid._math.double_precision import in_double_precision
 from bayesid.design.trajectory import Trajectory
 from bayesid.robot.robot import Robot
 
@@ -53,6 +54,7 @@ class Limit:
     depends: bool = False
     shrinks: bool = True
 
+    @in_double_precision
     def largest(self, trajectory: Trajectory) -> Array:
         """Return the largest value along a trajectory."""
         return jnp.max(self.quantity(trajectory))

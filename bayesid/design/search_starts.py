@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.kept_jit import quick_jit
+from bayesid._math.kept_jit import QuickJit
 from bayesid.design.design_problem import Problem
 from bayesid.design.flight import Flight, Outcome
 from bayesid.design.trajectories import PaperExcitation, TrajectoryFamily
@@ -168,7 +168,7 @@ def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
         outcome = Outcome(flight, flight.information(explained), prior)
         return [criterion.shown(problem.plan, outcome) for criterion in adaptable]
 
-    compiled = quick_jit(shown)
+    compiled = QuickJit(shown)
     starts = [random_start(problem, rng) for _ in range(MANOEUVRES)]
     each = [compiled(start, problem.centre, problem.precision, problem.explained) for start in starts]
     sums = iter(jax.tree.map(lambda *parts: np.sum(parts, axis=0), *each))

@@ -22,6 +22,7 @@ from scipy.optimize import minimize
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.double_precision import in_double_precision
 from bayesid.recording.joint_motion import Excitation, Motion
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Tip, kinematics
@@ -157,6 +158,7 @@ class ParameterisedMotion:
     family: TrajectoryFamily
     parameters: Floats | Array
 
+    @in_double_precision
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,), as NumPy arrays unless the parameters are traced."""
         state = self.family.state(jnp.asarray(self.parameters), np.asarray(time, dtype=float))

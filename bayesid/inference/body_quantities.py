@@ -13,6 +13,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats, Integers, Traceable
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
 from bayesid.inference.posterior import Posterior
@@ -168,6 +169,7 @@ def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
     }
 
 
+@in_double_precision
 def reported_effect(effect: Effect, values: Floats) -> Floats:
     """Return the reported quantities of an effect (..., m) from values of its parameters (..., n).
 

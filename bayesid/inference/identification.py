@@ -14,6 +14,7 @@ from bayesid._io.errors import InputError
 from bayesid._io.files import write_json
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
@@ -343,6 +344,7 @@ class Identification:
         return effects
 
 
+@in_double_precision
 def prior_range(effect: Effect) -> tuple[list[float], list[float]]:
     """Return the ends of the central 68 % of the prior of an effect's quantities."""
     z = on_device(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))

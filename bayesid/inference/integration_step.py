@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
@@ -156,6 +157,7 @@ def simulate_padded(
     return compiled.simulated(structure, numbers, on_device(z), pad_grids(grids, count, samples), attitude)
 
 
+@in_double_precision
 def _error(
     model: Model,
     manoeuvres: Sequence[Manoeuvre],

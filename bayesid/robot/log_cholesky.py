@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
 from bayesid.robot.inertial_parameters import InertialParameters, parameters_from_pseudo_inertia
 
@@ -60,6 +61,7 @@ def log_cholesky_factor(coordinates: Array) -> Array:
     return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
 
 
+@in_double_precision
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
     """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,).
 
@@ -72,6 +74,7 @@ def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array
     return vector_from_factor(on_device(upper_cholesky(centre.pseudo_inertia)), coordinates)
 
 
+@in_double_precision
 @jax.jit  # traced once for all bodies
 def vector_from_factor(centre: Array, coordinates: Array) -> Array:
     """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`).

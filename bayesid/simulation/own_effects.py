@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._math.double_precision import in_double_precision
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import composite
@@ -37,6 +38,7 @@ _PASSED: set[tuple[object, ...]] = set()
 """What has been tried, so that a search that builds many models of one effect tries it once."""
 
 
+@in_double_precision
 def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) -> None:
     """Call the hooks of an effect of the user's own, once for each robot; those of the package are tested with it.
 

@@ -20,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats, log_sum
+from bayesid._math.double_precision import in_double_precision
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind, companies
 from bayesid.diagnosis.candidates.linear_cause import moment_spreads, not_weighable
 from bayesid.diagnosis.candidates.linear_model import Linearisation, Remaining, SignatureBank, Signatures
@@ -136,6 +137,7 @@ class VibrationCause(CauseKind):
         return effect.starts_near([Resonance(clamped, coupling, damping)], False)
 
 
+@in_double_precision
 def _clamped_to_free(effect: Effect, start: Floats, point: Linearisation) -> float:
     """Return the frequency of a vibration with the base held, relative to the tone that is seen with the base free.
 

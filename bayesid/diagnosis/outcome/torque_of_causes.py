@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
 from bayesid.diagnosis.outcome.disturbance import WAVES, DisturbingWrench, Frame
 from bayesid.diagnosis.search.fitted_set import Hypothesis
@@ -19,6 +20,7 @@ from bayesid.simulation.instant import Instant
 __all__ = ["torque_of_causes", "torque_spectrum"]
 
 
+@in_double_precision
 def torque_of_causes(hypothesis: Hypothesis) -> list[Floats] | None:
     """Return the torque of all causes that act by a force, a torque or a momentum, (S, 3) for each recording [N m].
 

@@ -16,6 +16,7 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
 from bayesid._math.runge_kutta import runge_kutta_step
@@ -73,6 +74,7 @@ class Vibration(NamedTuple):
         com = (np.asarray(node.body.com), np.asarray(sample.body.com))
         return cls(np.stack(forcing), np.stack(compliance), both, com)
 
+    @in_double_precision
     def rows(self, effect: Effect, values: Floats) -> tuple[Floats, Floats]:
         """Return changes of the tables by an effect's modes, for n sets of values: (n, R, S, 28), (n, R, T, 28)."""
         modes = jax.vmap(effect.modes)(on_device(values))
