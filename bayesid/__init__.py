@@ -13,6 +13,7 @@ Names are loaded when they are first used (PEP 562), so that the import itself c
 from __future__ import annotations
 
 import importlib
+import sys
 import warnings
 from types import ModuleType
 from typing import TYPE_CHECKING
