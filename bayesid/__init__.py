@@ -7,162 +7,29 @@ takes a study and a seed and returns the result::
     print(found)
     print(found.identification.bodies["base_link"].mass)
 
-Names are loaded when they are first used (PEP 562), so that the import itself costs nothing.
+Names are those of ``__init__.pyi``, and loaded when they are first used (PEP 562), so that the import costs nothing.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import sys
 import warnings
+from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    __version__: str
+_STUB = Path(__file__).with_suffix(".pyi")
+"""Imports of all public names, which type checkers read too."""
 
-    from bayesid._io.errors import InputError
-    from bayesid.app.functions.check_study import StudyCheck, check
-    from bayesid.app.functions.design_study import Designs, design
-    from bayesid.app.functions.diagnose_study import diagnose
-    from bayesid.app.functions.identifiability_of_study import Identifiability, identifiability
-    from bayesid.app.functions.identify_study import identify
-    from bayesid.app.functions.loop_study import loop
-    from bayesid.app.functions.predict_study import Predictions, predict
-    from bayesid.app.functions.simulate_study import Simulation, simulate
-    from bayesid.app.schema import Study
-    from bayesid.app.study_to_design import load_problem
-    from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
-    from bayesid.design import Design, Problem
-    from bayesid.design.base_prediction import Prediction
-    from bayesid.design.loop_history import History
-    from bayesid.diagnosis import CausePrior, Diagnosis, DiagnosisSettings, Status
-    from bayesid.inference.identification import Identification
-    from bayesid.inference.posterior import Posterior
-    from bayesid.recording.joint_motion import Excitation, MeasuredMotion
-    from bayesid.recording.recording import Recording
-    from bayesid.robot.body_prior import BodyPrior
-    from bayesid.robot.inertial_parameters import InertialParameters
-    from bayesid.robot.robot import Load, Robot
-    from bayesid.robot.wheel import Wheel
-    from bayesid.simulation.effects import Effect, Parameter, Wrench, create, known_effects, register
-    from bayesid.simulation.joint_torques import TorqueSensor
-    from bayesid.simulation.model import Manoeuvre, Model
-    from bayesid.simulation.orbit import Orbit
-    from bayesid.simulation.sensors import (
-        AngleRandomWalk,
-        Coloured,
-        Filter,
-        Instrument,
-        Noise,
-        NoiseDensity,
-        Quantised,
-        Scaled,
-        Sensed,
-        Sensor,
-        SensorKind,
-        StarTracker,
-        White,
-    )
-
-__all__ = [
-    "AngleRandomWalk",
-    "BodyPrior",
-    "CausePrior",
-    "Coloured",
-    "Design",
-    "Designs",
-    "Diagnosis",
-    "DiagnosisSettings",
-    "Effect",
-    "Excitation",
-    "Filter",
-    "History",
-    "Identifiability",
-    "Identification",
-    "InertialParameters",
-    "InputError",
-    "Instrument",
-    "Load",
-    "Manoeuvre",
-    "MeasuredMotion",
-    "Model",
-    "Noise",
-    "NoiseDensity",
-    "Orbit",
-    "Parameter",
-    "Posterior",
-    "Prediction",
-    "Predictions",
-    "Problem",
-    "Quantised",
-    "Recording",
-    "Robot",
-    "Scaled",
-    "Sensed",
-    "Sensor",
-    "SensorKind",
-    "Simulation",
-    "StarTracker",
-    "Status",
-    "Study",
-    "StudyCheck",
-    "TorqueSensor",
-    "Wheel",
-    "White",
-    "Wrench",
-    "check",
-    "create",
-    "design",
-    "diagnose",
-    "identifiability",
-    "identify",
-    "known_effects",
-    "load_manoeuvres",
-    "load_model",
-    "load_posterior",
-    "load_problem",
-    "loop",
-    "predict",
-    "register",
-    "simulate",
-]
-
-_NAMES = {
-    "_io.errors": "InputError",
-    "app.functions.check_study": "StudyCheck check",
-    "app.functions.design_study": "Designs design",
-    "app.functions.diagnose_study": "diagnose",
-    "app.functions.identifiability_of_study": "Identifiability identifiability",
-    "app.functions.identify_study": "identify",
-    "app.functions.loop_study": "loop",
-    "app.functions.predict_study": "Predictions predict",
-    "app.functions.simulate_study": "Simulation simulate",
-    "app.schema": "Study",
-    "app.study_to_design": "load_problem",
-    "app.study_to_model": "load_manoeuvres load_model load_posterior",
-    "design": "Design Problem",
-    "design.base_prediction": "Prediction",
-    "design.loop_history": "History",
-    "diagnosis": "CausePrior Diagnosis DiagnosisSettings Status",
-    "inference.identification": "Identification",
-    "inference.posterior": "Posterior",
-    "recording.joint_motion": "Excitation MeasuredMotion",
-    "recording.recording": "Recording",
-    "robot.body_prior": "BodyPrior",
-    "robot.inertial_parameters": "InertialParameters",
-    "robot.robot": "Load Robot",
-    "robot.wheel": "Wheel",
-    "simulation.effects": "Effect Parameter Wrench create known_effects register",
-    "simulation.joint_torques": "TorqueSensor",
-    "simulation.model": "Manoeuvre Model",
-    "simulation.orbit": "Orbit",
-    "simulation.sensors": "AngleRandomWalk Coloured Filter Instrument Noise NoiseDensity "
-    "Quantised Scaled Sensed Sensor SensorKind StarTracker White",
+_PLACES = {
+    alias.name: line.module
+    for line in ast.parse(_STUB.read_text(encoding="utf-8")).body
+    if isinstance(line, ast.ImportFrom) and line.module is not None
+    for alias in line.names
 }
-"""Public names by the module that defines them."""
 
-_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_PLACES)
 
 # the pinned ArviZ announces its successor at every import
 warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=FutureWarning)
@@ -191,8 +58,8 @@ def __getattr__(name: str) -> object:
         return version("bayesid")
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)
+    return getattr(importlib.import_module(_PLACES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__

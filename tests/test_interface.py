@@ -26,10 +26,10 @@ OF_THE_COMMAND = {"file", "output", "progress", "scheduler"}
 
 
 def test_every_name_is_loaded_and_known_to_type_checkers():
-    tree = ast.parse(Path(bayesid.__file__).read_text(encoding="utf-8"))
-    seen = next(node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
-    stated = {alias.name: line.module for line in seen.body if isinstance(line, ast.ImportFrom) for alias in line.names}
-    assert sorted(stated) == bayesid.__all__ == sorted(bayesid.__all__)
+    tree = ast.parse(Path(bayesid.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    stated = {alias.name: line.module for line in tree.body if isinstance(line, ast.ImportFrom) for alias in line.names}
+    assert sorted(stated) == bayesid.__all__ == dir(bayesid)
+    assert {*COMMANDS, "TorqueSensor", "Filter", "Coloured", "Diagnosis", "plot_verdict"} <= set(stated)
     for name, module in stated.items():
         assert getattr(bayesid, name) is getattr(importlib.import_module(module), name)
     with pytest.raises(AttributeError, match="no attribute 'banana'"):

@@ -22,7 +22,6 @@ from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.report import Document, figures, format_quantity, identification_report
 from bayesid.report.document import literal
-from bayesid.report.figures.robot_figures import equivalent_box
 from bayesid.report.identification_report import agreement_sentences, misfit_rows, parameter_rows, start_rows, verdict
 from bayesid.report.model_assumptions import joint_rows, model_sentences
 from bayesid.report.numbers import (
@@ -36,6 +35,7 @@ from bayesid.report.numbers import (
     format_vector,
 )
 from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.link_shapes import equivalent_box
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient, SensorBias
 from bayesid.simulation.model import Manoeuvre, Model

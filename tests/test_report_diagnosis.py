@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import bayesid.diagnosis
 from bayesid._io.errors import InputError
@@ -850,6 +851,31 @@ def test_without_a_record_the_box_has_none(biased):
     assert entries["Size, ± 95 %"] == size_text(biased.after, "accel-bias")
     assert "base_link.mass: given" in entries["What it changes"]
     assert "accel 3.2 × 10⁻⁵ before, 1.7 × 10⁻⁵ after m/s²" in entries["What it changes"]
+
+
+def test_plots_of_a_diagnosis_take_axes(biased, disturbance):
+    figure = Figure()
+    assert bayesid.plot_verdict(biased, axes=figure.subplots(1, 3)) is figure
+    drawn = [axes.lines[0].get_xydata() for axes in bayesid.plot_verdict(biased).axes[1:]]
+    np.testing.assert_array_equal([axes.lines[0].get_xydata() for axes in figure.axes[1:]], drawn)
+    seen = replace(biased, disturbance=disturbance)
+    panels = np.shape(bayesid.plot_disturbance(seen, "inertial").axes)[0]
+    figure = Figure()
+    assert bayesid.plot_disturbance(seen, "inertial", axes=figure.subplots(panels // 3, 3)) is figure
+    assert len(bayesid.plot_residuals(biased).axes) == len(bayesid.plot_spectrum(biased).axes) == 6
+    assert len(bayesid.plot_manoeuvre(biased).axes) == 2
+
+
+def test_a_diagnosis_is_shown_by_its_verdict_and_its_causes(biased, clean):
+    text, html = repr(biased), biased._repr_html_()
+    assert text.startswith("Verdict: explained, accel-bias (1).")
+    row = next(line for line in text.splitlines() if line.startswith("accel-bias "))
+    assert all(f"{axis} " in row for axis in "xyz")
+    assert "m/s2" in row
+    assert f"with the causes {biased.gain.after.chi2_per_sample:.4g}." in text
+    assert "<td>accel-bias</td>" in html
+    assert len(text) < 2000
+    assert repr(clean).startswith("Verdict: adequate.")
 
 
 def test_what_changes_the_readings_alone_has_no_disturbance(printed):

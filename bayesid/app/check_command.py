@@ -32,5 +32,5 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
         write_json(folder / "check.json", result.to_dict())
         origin = report_origin(study, "check", None, output=output)
         check_report(posterior, result.recordings, study.title, folder / "report.pdf", origin=origin)
-    yield from result.sentences
+    yield from result.summary().sentences
     yield f"Wrote {output / 'report.pdf'}."

@@ -47,7 +47,6 @@ def run(
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import Store
     from bayesid.report import design_report
-    from bayesid.report.design_report import design_sentences
 
     if separate is not None:
         study = separating(study, separate)
@@ -80,5 +79,5 @@ def run(
             origin = report_origin(study, "design", seed, output=output, **asked, separate=separate)
             design_report(result.manoeuvres, result.best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
-    yield from design_sentences(result.manoeuvres, result.best)
+    yield from result.summary().sentences
     yield f"Wrote {output / 'report.pdf'}."

@@ -41,5 +41,5 @@ def run(
         identifiability_report(
             result.structure, result.practical, result.statement, study.title, folder / "report.pdf", origin=origin
         )
-    yield from result.sentences
+    yield from result.summary().sentences
     yield f"Wrote {output / 'report.pdf'}."

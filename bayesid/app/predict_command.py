@@ -40,5 +40,5 @@ def run(
         origin = report_origin(study, "predict", seed, output=output, draws=draws, posterior=posterior)
         drawn = (result.posterior, result.manoeuvres, result.recordings)
         prediction_report(*drawn, study.title, folder / "report.pdf", origin=origin)
-    yield from result.sentences
+    yield from result.summary().sentences
     yield f"Wrote {output / 'report.pdf'}."

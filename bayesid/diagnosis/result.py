@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
+from bayesid._io.short_form import ShortForm, Summary, format_spread
+from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.design.design_result import Design
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
@@ -42,8 +44,8 @@ SHOWN = 0.01  # probability down to which sets of causes are listed; the most pr
 PAIRS = 10  # largest number of pairs of causes that imitate each other in diagnosis.json
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(ShortForm):
     """Result of `diagnose`.
 
     Attributes
@@ -266,6 +268,26 @@ class Diagnosis:
     def fitted(self, causes: Sequence[str]) -> Hypothesis:
         """Fit the present model with some causes of the catalogue."""
         return self.search.under(causes).fit(causes, self.effects) if causes else self.before
+
+    def summary(self) -> Summary:
+        """Return the verdict, what it gains, and the candidates that are named or probable to one per cent."""
+        verdict, probabilities, gain = self.verdict, self.probabilities, self.gain
+        named = [f"{name} ({self.cause_probability(name):.3g})" for name in verdict.causes if name != UNKNOWN]
+        sentences = [
+            f"Verdict: {verdict.status.value}" + (f", {joined(named)}." if named else "."),
+            f"Probability of nothing {probabilities.nothing:.3g}, of what is in no catalogue "
+            f"{probabilities.unknown:.3g}; of something unnamed {self.remainder.probability:.3g}.",
+            f"Chi-square per sample {gain.before.chi2_per_sample:.4g}"
+            + (f", with the causes {gain.after.chi2_per_sample:.4g}." if named else "."),
+        ]
+        rows = []
+        for row in self.candidates:
+            if row.name in verdict.causes or row.probability >= SHOWN:
+                after = amplitudes_of(self.after, row.name) if row.name in verdict.causes else None
+                sizes = zip(row.quantities, row.mean, row.sd, strict=True) if after is None else after
+                text = ", ".join(f"{key} {format_spread(mean, sd, unit)}" for (key, unit), mean, sd in sizes)
+                rows.append((row.name, f"{row.probability:.3g}", f"{row.signal_to_noise:.1f}", text))
+        return Summary(sentences, ("cause", "probability", "signal/noise", "size"), rows)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of diagnosis.json."""

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bayesid._io.short_form import ShortForm, Summary, format_spread
 from bayesid._math.arrays import Floats, Integers, Traceable
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.kept_jit import kept_jit
@@ -26,9 +27,12 @@ __all__ = [
     "CONTRACTED",
     "PRIOR_ONLY",
     "BodyDraws",
+    "CentreOfMass",
     "Contraction",
     "ContractionVerdict",
+    "InertiaTensor",
     "Linearised",
+    "QuantityDraws",
     "bodies_of",
     "body_dict",
     "compare",
@@ -55,8 +59,65 @@ BODY_QUANTITIES = {
 """Reported quantities of a body -> unit; the inertia is about the centre of mass, in the axes of the link."""
 
 
-@dataclass(frozen=True)
-class BodyDraws:
+@dataclass(frozen=True, repr=False)
+class QuantityDraws(ShortForm):
+    """Draws of one quantity.
+
+    Attributes
+    ----------
+    draws : (draws,) array
+        Draws, in the unit.
+    unit : str
+    """
+
+    draws: Floats
+    unit: str
+
+    @property
+    def mean(self) -> float:
+        """Mean of the draws."""
+        return float(self.draws.mean())
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of the draws."""
+        return float(self.draws.std(ddof=1))
+
+    def interval(self, share: float = 0.95) -> tuple[float, float]:
+        """Return the ends of the central interval that holds a share of the draws."""
+        low, high = np.quantile(self.draws, [0.5 - 0.5 * share, 0.5 + 0.5 * share]).tolist()
+        return low, high
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the quantity in the form that it has in JSON."""
+        return quantity(self.mean, self.sd, self.unit)
+
+    def summary(self) -> Summary:
+        """Return mean and standard deviation."""
+        return Summary([format_spread(self.mean, self.sd, self.unit)])
+
+
+class CentreOfMass(NamedTuple):
+    """Coordinates of a centre of mass in the axes of the link [m]."""
+
+    x: QuantityDraws
+    y: QuantityDraws
+    z: QuantityDraws
+
+
+class InertiaTensor(NamedTuple):
+    """Entries of an inertia about the centre of mass, in the axes of the link [kg m2]."""
+
+    xx: QuantityDraws
+    yy: QuantityDraws
+    zz: QuantityDraws
+    xy: QuantityDraws
+    xz: QuantityDraws
+    yz: QuantityDraws
+
+
+@dataclass(frozen=True, repr=False)
+class BodyDraws(ShortForm):
     """Draws of the reported quantities of one body.
 
     Parameters
@@ -79,6 +140,30 @@ class BodyDraws:
     def sd(self) -> Floats:
         """Standard deviation of the draws, shape (10,)."""
         return self.values.std(axis=0, ddof=1)
+
+    def __getitem__(self, key: str) -> QuantityDraws:
+        """Return a quantity by its name in `BODY_QUANTITIES`, such as ``"com.x"``."""
+        return QuantityDraws(self.values[:, list(BODY_QUANTITIES).index(key)], BODY_QUANTITIES[key])
+
+    @property
+    def mass(self) -> QuantityDraws:
+        """Mass [kg]."""
+        return self["mass"]
+
+    @property
+    def com(self) -> CentreOfMass:
+        """Centre of mass [m]."""
+        return CentreOfMass(*(self[f"com.{axis}"] for axis in CentreOfMass._fields))
+
+    @property
+    def inertia(self) -> InertiaTensor:
+        """Inertia about the centre of mass [kg m2]."""
+        return InertiaTensor(*(self[f"inertia.{axes}"] for axes in InertiaTensor._fields))
+
+    def summary(self) -> Summary:
+        """Return mean and standard deviation of every quantity."""
+        rows = [(f"{self.name}.{key}", str(self[key])) for key in BODY_QUANTITIES]
+        return Summary([], ("quantity", "mean ± sd"), rows)
 
 
 class Linearised(NamedTuple):
@@ -197,14 +282,8 @@ def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
 
 def body_dict(body: BodyDraws) -> dict[str, Any]:
     """Return a body in the form that it has in identification.json."""
-    entries = [
-        quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
-    ]
-    return {
-        "mass": entries[0],
-        "com": entries[1:4],
-        "inertia": dict(zip(("xx", "yy", "zz", "xy", "xz", "yz"), entries[4:], strict=True)),
-    }
+    inertia = {axes: entry.to_dict() for axes, entry in body.inertia._asdict().items()}
+    return {"mass": body.mass.to_dict(), "com": [entry.to_dict() for entry in body.com], "inertia": inertia}
 
 
 CONTRACTED, PRIOR_ONLY = 0.5, 0.1

@@ -17,6 +17,7 @@ from typing import Protocol
 import emcee
 import h5py
 import numpy as np
+from emcee.backends import HDFBackend
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
@@ -125,7 +126,7 @@ class Chains:
     autocorrelation : float
         Autocorrelation time, the longest over the coordinates [steps].
     acceptance : float
-        Mean share of accepted proposals.
+        Mean share of emcee's accepted proposals; not a number for another sampler.
     evaluations : int
         Number of evaluations of the posterior density.
     steps : int
@@ -154,6 +155,14 @@ class Chains:
         """Whether hardly any proposal was accepted, so that the walkers have not left where they started."""
         return self.acceptance < STUCK and self.autocorrelation >= self.steps >= STUCK_AFTER
 
+    @property
+    def origin(self) -> str:
+        """How the draws were made, as part of a sentence."""
+        if np.isnan(self.acceptance):
+            return f"a sampler of the user's, {len(self.y)} chains of {self.steps} draws"
+        accepted = f"{100.0 * self.acceptance:.0f} % of the proposals accepted"
+        return f"emcee, {len(self.y)} independent ensembles of {self.walkers} walkers, {self.steps} steps, {accepted}"
+
     @cached_property
     def z(self) -> Floats:
         """Draws in the posterior's coordinates, shape (ensembles, draws, n)."""
@@ -174,7 +183,7 @@ def sample(
     max_steps: int = 5000,
     trusted: bool = False,
     proposal: Proposal | None = None,
-    file: Path | None = None,
+    file: str | Path | HDFBackend | None = None,
     progress: Progress = silent,
 ) -> Chains:
     """Sample the posterior until it has converged.
@@ -196,8 +205,9 @@ def sample(
         Whether importance sampling trusts the proposal, so that most moves may propose from it.
     proposal : Proposal, optional
         Approximation of which independence moves propose, by default a Student-t about the mode.
-    file : path, optional
-        HDF5 file that keeps every step; if it holds a part of the same run, sampling goes on from there.
+    file : path or emcee.backends.HDFBackend, optional
+        HDF5 file of emcee that keeps every step, in groups ``ensemble-0`` and so on, or of the backend's name and the
+        same numbers; if it holds a part of the same run, sampling goes on from there.
     progress : Progress, optional
         Function that is called after every block of steps.
     """
@@ -274,11 +284,12 @@ def _start(
     return points[np.argsort(log_weights + state.gumbel(size=len(points)))[-walkers:]]
 
 
-def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend:
+def _backend(file: str | Path | HDFBackend | None, number: int, key: str) -> emcee.backends.Backend:
     """Return the store of an ensemble's steps, and refuse samples of another key."""
     if file is None:
         return emcee.backends.Backend()
-    name = f"ensemble-{number}"
+    name = f"{file.name if isinstance(file, HDFBackend) else 'ensemble'}-{number}"
+    file = Path(file.filename if isinstance(file, HDFBackend) else file)
     if file.is_file():
         try:
             with h5py.File(file, "r") as opened:
@@ -289,7 +300,7 @@ def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend
     return _KeyedBackend(file, name, key)
 
 
-class _KeyedBackend(emcee.backends.HDFBackend):
+class _KeyedBackend(HDFBackend):
     """HDF5 backend that stores a key of the data, model and seed on which its samples depend."""
 
     def __init__(self, file: Path, name: str, key: str) -> None:

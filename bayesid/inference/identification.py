@@ -6,13 +6,16 @@ import time
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from emcee.backends import HDFBackend
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import write_json
 from bayesid._io.progress import Progress, silent
+from bayesid._io.short_form import ShortForm, Summary, format_spread
+from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
@@ -28,13 +31,20 @@ from bayesid.inference.body_quantities import (
     reported_effect,
 )
 from bayesid.inference.collapsed_proposal import collapsed_proposal
-from bayesid.inference.ensemble import Chains, sample
+from bayesid.inference.ensemble import Chains
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import identified_robot
+from bayesid.inference.posterior_file import to_arviz
 from bayesid.inference.predicted_readings import SensorFit, TorqueFit, integration_error_at, sensor_fits, torque_fits
+from bayesid.inference.sampler import Emcee, Sampler, SamplingTarget, chains_of
+from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from xarray import DataTree
 
 __all__ = ["EffectQuantity", "Identification", "StartState", "identify"]
 
@@ -100,8 +110,8 @@ class StartState:
         return {**vars(self), "mean": self.mean.tolist(), "sd": self.sd.tolist()}
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, repr=False)
+class Identification(ShortForm):
     """Result of `identify`.
 
     Attributes
@@ -336,6 +346,41 @@ class Identification:
         """Write `to_dict` to a file, whole or not at all."""
         write_json(file, self.to_dict())
 
+    def to_datatree(self, seed: int = 0) -> DataTree:
+        """Return the result by the convention of ArviZ, each independent ensemble a chain.
+
+        Its groups are posterior, prior, sample_stats, log_likelihood, posterior_predictive and observed_data.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the predicted sensor noise and of the draws from the prior.
+        """
+        return to_arviz(self, np.random.default_rng(seed)).to_datatree()
+
+    @cached_property
+    def robot(self) -> Robot:
+        """Robot with the posterior mean of every unknown body."""
+        return identified_robot(self)
+
+    def to_urdf(self, file: str | Path) -> None:
+        """Write the URDF with the identified inertias of the unknown bodies, whole or not at all."""
+        self.robot.write_urdf(file)
+
+    def summary(self) -> Summary:
+        """Return the fit, and mean and standard deviation of every quantity."""
+        expected, sd = self.expected_chi2
+        names = joined(self.bodies) or "what is no body"
+        fit = (
+            f"Identification of {names}: {self.posterior.samples} samples, {self.posterior.size} unknowns; chi-square "
+            f"{self.optimum.chi2:.0f}, where {expected:.0f} ± {sd:.0f} is expected; "
+            f"{self.chains.effective_samples:.0f} effective samples."
+        )
+        rows = [row for body in self.bodies.values() for row in body.summary().rows]
+        effects = self.effect_quantities
+        rows += [(f"{row.label}.{row.name}", format_spread(row.mean, row.sd, row.unit)) for row in effects]
+        return Summary([fit, *self.disagreements], ("quantity", "mean ± sd"), rows)
+
     def _effects_dict(self) -> dict[str, Any]:
         effects: dict[str, Any] = {}
         for row in self.effect_quantities:
@@ -359,8 +404,9 @@ def identify(
     *,
     start: Floats | None = None,
     effective_samples: float = 4000.0,
+    sampler: Sampler | None = None,
     max_steps: int = 5000,
-    file: Path | None = None,
+    file: str | Path | HDFBackend | None = None,
     progress: Progress = silent,
 ) -> Identification:
     """Identify the unknowns of a posterior.
@@ -372,14 +418,18 @@ def identify(
         Seed of all random numbers.
     start : (n,) array, optional
         Starting point of the search for the mode, by default the prior's centre.
+    sampler : Sampler, optional
+        What samples the posterior, by default `Emcee`, whose ``max_steps`` and ``file`` may be given here.
     effective_samples, max_steps, file, progress
         See `bayesid.inference.sample`.
 
     Raises
     ------
     InputError
-        If no value of the unknowns comes near the data.
+        If no value of the unknowns comes near the data, or the sampler does not return draws of the posterior.
     """
+    if sampler is not None and file is not None:
+        raise InputError("a sampler and a file of emcee are given", remedy="Give sampler=Emcee(file=...) alone")
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     if not optimum.chi2 < HOPELESS * refined.samples:
@@ -392,20 +442,17 @@ def identify(
     parameterisation = choose_parameterisation(refined, optimum, rng)
     evidence = importance_sample(parameterisation, optimum, rng)
     began = time.perf_counter()
-    trusted, proposal = evidence.trusted, None
+    proposal = None
     if evidence.effective_samples < NEARLY_NORMAL * evidence.evaluations:
         proposal = collapsed_proposal(refined, optimum, rng, effective_samples)
-    if proposal is not None:
-        parameterisation, trusted = LinearParameterisation(refined), True
-    chains = sample(
-        parameterisation,
-        optimum,
-        walkers,
-        effective_samples=effective_samples,
-        max_steps=max_steps,
-        trusted=trusted,
-        proposal=proposal,
-        file=file,
-        progress=progress,
+    if proposal is None:
+        nearly = parameterisation.proposal(optimum)
+        target = SamplingTarget(refined, optimum, parameterisation, nearly, evidence.trusted)
+    else:
+        target = SamplingTarget(refined, optimum, LinearParameterisation(refined), proposal, True)
+    chosen: Sampler = Emcee(max_steps, file) if sampler is None else sampler
+    drawn = chosen.sample(
+        target, np.random.default_rng(walkers), effective_samples=effective_samples, progress=progress
     )
+    chains = drawn if isinstance(drawn, Chains) else chains_of(refined, drawn, rng, effective_samples)
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)

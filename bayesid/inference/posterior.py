@@ -9,7 +9,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
+from scipy.special import ndtri
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
@@ -40,7 +43,9 @@ CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os
 class Posterior:
     """Posterior of the unknowns of a model given recorded manoeuvres; immutable.
 
-    The coordinates ``z`` have a standard-normal prior (`Unknowns`). `Posterior.of` builds the posterior; functions of
+    The coordinates ``z`` have a standard-normal prior (`Unknowns`). `log_density`, `log_prior`, `log_likelihood`,
+    `prior_transform`, `jacobian` and `gradient` take and return NumPy arrays, so that any sampler takes it as it is;
+    `names` are those of the coordinates. `Posterior.of` builds the posterior; functions of
     `bayesid.inference.noise_changes` and `bayesid.inference.predicted_readings` give it other noise or other samples,
     and predict readings.
 
@@ -131,6 +136,11 @@ class Posterior:
         return self.unknowns.size
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return self.unknowns.names
+
+    @property
     def samples(self) -> int:
         """Number of scalar samples that the likelihood uses."""
         return self.data.samples
@@ -171,10 +181,53 @@ class Posterior:
         return r if self.flat_prior else np.concatenate([r, z])
 
     def jacobian(self, z: Floats) -> Floats:
-        """Return the Jacobian of `least_squares`."""
+        """Return the Jacobian of `least_squares` at one point, shape (size,) -> (residuals, size)."""
         slopes = compiled.jacobian(self.structure, self.numbers, on_device(z), self.data.arrays)
         j = np.asarray(slopes).reshape(self.size, -1).T
         return j if self.flat_prior else np.concatenate([j, np.eye(self.size)])
+
+    def gradient(self, z: Floats) -> Floats:
+        """Return the gradient of `log_density` at one point, shape (size,) -> (size,)."""
+        return -self.jacobian(z).T @ self.least_squares(z)
+
+    def log_prior(self, z: Floats) -> Floats:
+        """Return the normalised log prior density, shape (..., size) -> (...); zero where the prior is flat."""
+        squares = np.sum(np.square(z), axis=-1)
+        return 0.0 * squares if self.flat_prior else -0.5 * squares - 0.5 * self.size * np.log(2.0 * np.pi)
+
+    def log_likelihood(self, z: Floats) -> Floats:
+        """Return the log likelihood of all recordings, shape (..., size) -> (...); not finite where nothing moves."""
+        z = np.asarray(z, dtype=float)
+        return self.log_likelihoods(z.reshape(-1, self.size)).sum(axis=1).reshape(z.shape[:-1])[()]
+
+    def log_density(self, z: Floats) -> Floats:
+        """Return the normalised log prior plus the log likelihood, shape (..., size) -> (...).
+
+        It is minus infinity where the simulation has no finite readings.
+        """
+        z = np.asarray(z, dtype=float)
+        return self.log_densities(z.reshape(-1, self.size))[:, 0].reshape(z.shape[:-1])[()]
+
+    def prior_transform(self, unit: Floats) -> Floats:
+        """Return the coordinates whose prior probabilities are given, for nested sampling.
+
+        Parameters
+        ----------
+        unit : (..., size) array
+            Points of the unit cube, whose uniform distribution becomes the prior.
+
+        Returns
+        -------
+        (..., size) array
+        """
+        return ndtri(np.asarray(unit, dtype=float))
+
+    def traced_log_density(self, z: Array) -> Array:
+        """Return `log_density` at one point (size,), in a function that JAX traces and differentiates."""
+        r = compiled.residuals(self.structure, self.numbers, z, self.data.arrays)
+        prior = 0.0 if self.flat_prior else z @ z + self.size * np.log(2.0 * np.pi)
+        value = self.log_normalisation.sum() - 0.5 * (jnp.sum(r**2) + prior)
+        return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
     def log_likelihoods(self, z: Floats) -> Floats:
         """Return the log likelihoods of all recordings at many points, shape (n, size) -> (n, R)."""
@@ -187,16 +240,11 @@ class Posterior:
     def _chi2(self, z: Floats) -> Floats:
         return np.asarray(compiled.chi2(self.structure, self.numbers, z, self.data.arrays))
 
-    def log_density(self, z: Floats) -> Floats:
-        """Return the normalised log prior plus the log likelihood at many points, shape (n, size) -> (n,)."""
-        return self.log_densities(z)[:, 0]
-
     def log_densities(self, z: Floats) -> Floats:
         """Return `log_density` and beside it the log likelihoods of the R recordings, (n, size) -> (n, 1 + R)."""
         z = np.atleast_2d(z)
-        log_prior = 0.0 if self.flat_prior else -0.5 * (z**2).sum(axis=1) - 0.5 * self.size * np.log(2.0 * np.pi)
         likelihoods = self.log_likelihoods(z)
-        total = likelihoods.sum(axis=1) + log_prior
+        total = likelihoods.sum(axis=1) + self.log_prior(z)
         return np.column_stack([np.where(np.isfinite(total), total, -np.inf), likelihoods])
 
 

@@ -19,7 +19,7 @@ from bayesid._io.files import write_json
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, body_dict
-from bayesid.inference.identification import Identification
+from bayesid.inference.posterior_file import SampledResult
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.inertial_parameters import BASIS, BodyChange, InertialParameters, mass_com_inertia
 from bayesid.robot.log_cholesky import log_cholesky_coordinates, log_cholesky_vector
@@ -58,7 +58,7 @@ class InertialDraws:
     values: Floats
 
     @classmethod
-    def of(cls, result: Identification) -> InertialDraws:
+    def of(cls, result: SampledResult) -> InertialDraws:
         """Return all draws of a result, marginalised bodies included."""
         names = tuple(prior.name for prior in result.posterior.model.priors)
         inertial = np.asarray(result.posterior.unknowns.values_of(result.chains.flat).inertial)
@@ -198,7 +198,7 @@ def _pseudo(vectors: Floats) -> Floats:
     return np.einsum("np,pij->nij", vectors, BASIS)
 
 
-def identified_robot(result: Identification) -> Robot:
+def identified_robot(result: SampledResult) -> Robot:
     """Return the robot with the posterior mean of every unknown body, marginalised ones included.
 
     It is the mean of the ten linear parameters. Pseudo-inertias of physical bodies form a convex cone, so that their
@@ -211,7 +211,7 @@ def identified_robot(result: Identification) -> Robot:
     return robot
 
 
-def uncertainty(result: Identification) -> dict[str, Any]:
+def uncertainty(result: SampledResult) -> dict[str, Any]:
     """Return the mean, standard deviation and joint covariance of all unknown bodies, as in identification.json.
 
     The mean of a centre of mass or inertia differs from that of `identified_robot`, since neither is linear in the
@@ -228,7 +228,7 @@ def uncertainty(result: Identification) -> dict[str, Any]:
     }
 
 
-def write_identified(result: Identification, folder: Path) -> None:
+def write_identified(result: SampledResult, folder: Path) -> None:
     """Write ``identified.urdf`` and ``identified-uncertainty.json`` to a folder.
 
     Parameters
@@ -240,7 +240,7 @@ def write_identified(result: Identification, folder: Path) -> None:
     write_json(folder / "identified-uncertainty.json", uncertainty(result))
 
 
-def _draws(result: Identification) -> dict[str, Floats]:
+def _draws(result: SampledResult) -> dict[str, Floats]:
     """Return the draws of the linear parameters of every unknown body, shape (draws, 10)."""
     draws = InertialDraws.of(result)
     return {name: draws.values[:, index] for index, name in enumerate(draws.names)}

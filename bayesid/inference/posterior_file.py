@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
-from bayesid.inference.identification import Identification
+from bayesid.inference.ensemble import Chains
+from bayesid.inference.importance import Evidence
+from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import noisy, predicted_readings
 from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
     import arviz as az
 
-__all__ = ["to_arviz", "write_draws", "write_netcdf"]
+__all__ = ["SampledResult", "to_arviz", "write_draws", "write_netcdf"]
 
 
 STORED = 1000
@@ -34,12 +36,32 @@ LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
 """Names of the linear parameters of a body (`InertialParameters.vector`), which a later study reads."""
 
 
-def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
+class SampledResult(Protocol):
+    """Posterior with its samples."""
+
+    @property
+    def posterior(self) -> Posterior:
+        """Posterior that was sampled."""
+        ...
+
+    @property
+    def chains(self) -> Chains:
+        """Posterior samples."""
+        ...
+
+    @property
+    def evidence(self) -> Evidence:
+        """Evidence by importance sampling."""
+        ...
+
+
+def to_arviz(result: SampledResult, rng: np.random.Generator) -> az.InferenceData:
     """Return a result as ArviZ data, in which each independent ensemble is a chain.
 
     The group ``posterior`` holds the physical quantities, ``inertial`` with the linear parameters of all bodies,
-    marginalised ones included, and ``z`` with the coordinates of standard-normal prior. The other groups are
-    ``log_likelihood`` by recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
+    marginalised ones included, and ``z`` with the coordinates of standard-normal prior; ``prior`` holds the same. The
+    other groups are ``sample_stats`` with the log density over ``z``, ``log_likelihood`` by recording,
+    ``posterior_predictive`` with sensor noise, and ``observed_data``.
 
     Parameters
     ----------
@@ -52,16 +74,21 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
     posterior, dims, attributes = _posterior_group(result, z)
+    predictive = _predictive(result, few, rng)
+    prior, _, _ = _posterior_group(result, rng.normal(size=(1, STORED, result.posterior.size)))
     data = az.from_dict(
         posterior=posterior,
+        prior=prior,
+        sample_stats={"lp": result.posterior.log_prior(z) + _thin(result.chains.log_likelihood, STORED).sum(axis=2)},
         log_likelihood=_log_likelihood(result),
-        posterior_predictive=_predictive(result, few, rng),
+        posterior_predictive=predictive,
         observed_data=_observed(result),
         dims={**dims, **_sensor_dims(result)},
         coords=_coords(result),
     )
     for name, described in attributes.items():
         data.posterior[name].attrs.update(described)
+        data.prior[name].attrs.update(described)
     for group in (data.posterior_predictive, data.observed_data):
         for sensor in result.posterior.model.sensors:
             for manoeuvre in result.posterior.manoeuvres:
@@ -78,7 +105,7 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
     return data
 
 
-def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
+def write_netcdf(result: SampledResult, file: Path, rng: np.random.Generator) -> None:
     """Write `to_arviz` to a NetCDF file, whole or not at all.
 
     Parameters
@@ -118,7 +145,7 @@ def _thin(draws: Floats, count: int) -> Floats:
 
 
 def _posterior_group(
-    result: Identification, z: Floats
+    result: SampledResult, z: Floats
 ) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, dict[str, str]]]:
     """Return the variables, each (chains, draws, ...), their further dimensions, and their units and frames."""
     chains, draws, size = z.shape
@@ -149,7 +176,7 @@ def _posterior_group(
     return group, dims, attributes
 
 
-def _coords(result: Identification) -> dict[str, Any]:
+def _coords(result: SampledResult) -> dict[str, Any]:
     coords: dict[str, Any] = {
         "unknown": list(result.posterior.unknowns.names),
         "body": [prior.name for prior in result.posterior.model.priors],
@@ -166,7 +193,7 @@ def _coords(result: Identification) -> dict[str, Any]:
     return coords
 
 
-def _sensor_dims(result: Identification) -> dict[str, list[str]]:
+def _sensor_dims(result: SampledResult) -> dict[str, list[str]]:
     recordings = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
     dims = {
         _name(kind, name): [f"time.{name}", _axis(kind)]
@@ -187,12 +214,12 @@ def _name(kind: SensorKind, recording: str) -> str:
     return f"{kind.value}.{recording}"
 
 
-def _log_likelihood(result: Identification) -> dict[str, Floats]:
+def _log_likelihood(result: SampledResult) -> dict[str, Floats]:
     values = _thin(result.chains.log_likelihood, STORED)
     return {m.recording.name: values[:, :, index] for index, m in enumerate(result.posterior.manoeuvres)}
 
 
-def _observed(result: Identification) -> dict[str, Floats]:
+def _observed(result: SampledResult) -> dict[str, Floats]:
     observed = {}
     for index, manoeuvre in enumerate(result.posterior.manoeuvres):
         times = result.posterior.data.times(index)
@@ -209,7 +236,7 @@ def _observed(result: Identification) -> dict[str, Floats]:
     return observed
 
 
-def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
+def _predictive(result: SampledResult, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
     """Return predicted readings with fresh noise of the sensors, for draws of shape (chains, draws, size)."""
     chains, draws, size = z.shape
     points = [predicted_readings(result.posterior, point) for point in z.reshape(-1, size)]

@@ -17,8 +17,6 @@ from bayesid.report.numbers import format_fixed, format_number, format_unit
 
 __all__ = ["check_report"]
 
-CURVE_POINTS = 600  # number of points of a curve over time
-
 
 def check_report(
     posterior: Posterior, checks: Sequence[RecordingCheck], title: str, file: Path, *, origin: str = ""
@@ -53,6 +51,11 @@ def check_report(
         document.figure(
             figures.robot_pose(robot, posterior.manoeuvres[0].motion, poses), "The robot during the first recording."
         )
+    document.figure(
+        figures.plot_robot(robot),
+        "The robot as its file draws it; a link without a shape is a homogeneous box of its mass, centre of mass and "
+        "inertia.",
+    )
     fits = sensor_fits(posterior, posterior.starting_point())
     for index, check in enumerate(checks):
         _add_recording(document, posterior, index, check)
@@ -117,9 +120,7 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             "Joint motion after smoothing; the last two columns are the standard deviations that the smoothing leaves "
             "[joint unit per s, per s²].",
         )
-        manoeuvre = posterior.manoeuvres[index]
-        time = np.linspace(manoeuvre.recording.time[0], manoeuvre.recording.time[-1], CURVE_POINTS)
-        document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
+        document.figure(figures.plot_manoeuvre(posterior, index), "Motion of the joints.")
 
 
 def _by_axis(values: Sequence[float] | np.ndarray) -> str:

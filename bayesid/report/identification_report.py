@@ -29,7 +29,6 @@ from bayesid.robot.inertial_parameters import mass_com_inertia
 __all__ = ["add_identification", "agreement_sentences", "identification_report", "verdict"]
 
 POSES = 4  # number of instants at which the robot is drawn
-CURVE_POINTS = 600  # number of points of a curve over time
 LARGEST_CORRELATIONS = 30  # largest number of quantities in the figure of correlations
 LIMIT = 3.0  # deviation of chi-square, in standard deviations of chi-square, that noise alone rarely reaches
 
@@ -112,8 +111,7 @@ def _add_robot(document: Document, result: Identification) -> None:
                 "the centre of mass of the last body.",
             )
         if robot.joints:
-            curves = figures.manoeuvre(motion, robot, np.linspace(time[0], time[-1], CURVE_POINTS))
-            document.figure(curves, f"Motion of the joints in {name}.")
+            document.figure(figures.plot_manoeuvre(result, number), f"Motion of the joints in {name}.")
 
 
 def _add_fit(document: Document, result: Identification) -> None:
@@ -164,9 +162,9 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
         figures.prior_to_posterior(result),
         "Width of the posterior over that of the prior. At one (10⁰) the data said nothing.",
     )
-    for name, body in result.bodies.items():
+    for name in result.bodies:
         document.figure(
-            figures.corner(body),
+            figures.plot_posterior(result, name),
             f"Joint posterior of {name}: contours hold 50 % and 90 %. Axes are offsets from the mean in standard "
             "deviations; mean and standard deviation stand over the diagonal.",
         )
@@ -243,11 +241,9 @@ def agreement_sentences(result: Identification) -> list[str]:
         f"{_converged(optimum.converged)}."
     )
     sampler = (
-        f"Samples: emcee, {len(chains.z)} independent ensembles of {chains.walkers} walkers, {chains.steps} steps "
-        f"each, {chains.evaluations} evaluations in {result.seconds:.0f} s. {chains.effective_samples:.0f} effective "
-        f"samples, largest R-hat {chains.r_hat:.4f}, longest autocorrelation time "
-        f"{format_number(chains.autocorrelation)} steps, {100.0 * chains.acceptance:.0f} % of the proposals accepted; "
-        f"{_converged(chains.converged)}."
+        f"Samples: {chains.origin}, {chains.evaluations} evaluations in {result.seconds:.0f} s. "
+        f"{chains.effective_samples:.0f} effective samples, largest R-hat {chains.r_hat:.4f}, longest autocorrelation "
+        f"time {format_number(chains.autocorrelation)} steps; {_converged(chains.converged)}."
     )
     weights = (
         f"Importance sampling: {evidence.evaluations} draws worth {evidence.effective_samples:.0f}, Pareto k-hat "

@@ -19,8 +19,6 @@ from bayesid.report.numbers import format_number, format_unit
 
 __all__ = ["simulation_report"]
 
-CURVE_POINTS = 600  # number of points of a curve over time
-
 
 def simulation_report(
     posterior: Posterior,
@@ -77,11 +75,9 @@ def simulation_report(
         )
     fits = sensor_fits(posterior, z)
     for index, recording in enumerate(recordings):
-        manoeuvre = posterior.manoeuvres[index]
         document.section(f"Recording {recording.name}")
         if posterior.model.robot.joints:
-            time = np.linspace(recording.time[0], recording.time[-1], CURVE_POINTS)
-            document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
+            document.figure(figures.plot_manoeuvre(posterior, index), "Motion of the joints.")
         document.figure(figures.measured_against_simulated(fits[index]), beside)
     document.section("Assumptions")
     document.items(model_sentences(posterior, integration_error_at(posterior, z)))

@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
 from bayesid.report.figures.figure_style import COLOURS, TRUTH, curve_style, shared_legend, styled, wide_figure
-from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, equivalent_box, sticks_of
+from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, sticks_of
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
+from bayesid.robot.link_shapes import equivalent_box
 from bayesid.robot.robot import Robot
 from studies.common import mission
 from studies.common.ets7 import TIP_SPEED

@@ -23,7 +23,6 @@ from bayesid.inference import (
     Optimum,
     Parameterisation,
     choose_parameterisation,
-    compiled,
     maximise,
 )
 from bayesid.inference.parameterisation import StudentT
@@ -97,9 +96,7 @@ class Target:
         if isinstance(self.parameterisation, LinearParameterisation):
             z = layout.from_linear(numbers.prior, z)
             change = layout.log_volume(numbers.prior, z)
-        r = compiled.residuals(posterior.structure, numbers, z, posterior.data.arrays)
-        constant = posterior.log_normalisation.sum() - 0.5 * self.size * np.log(2.0 * np.pi) + self.log_volume
-        value = -0.5 * (jnp.sum(r**2) + z @ z) - change + constant
+        value = posterior.traced_log_density(z) - change + self.log_volume
         return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
     @cached_property

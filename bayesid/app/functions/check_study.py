@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, recorded_posterior, study_of
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import RecordingCheck, check_recording
@@ -12,8 +13,8 @@ from bayesid.inference.recording_check import RecordingCheck, check_recording
 __all__ = ["StudyCheck", "check"]
 
 
-@dataclass(frozen=True)
-class StudyCheck:
+@dataclass(frozen=True, repr=False)
+class StudyCheck(ShortForm):
     """Result of `check`.
 
     Attributes
@@ -30,13 +31,14 @@ class StudyCheck:
     posterior: Posterior
     recordings: tuple[RecordingCheck, ...]
 
-    @property
-    def sentences(self) -> list[str]:
-        """What is conspicuous, a sentence for each recording."""
-        return [
-            f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
-            for check in self.recordings
-        ]
+    def summary(self) -> Summary:
+        """Return what is conspicuous, a sentence for each recording."""
+        return Summary(
+            [
+                f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
+                for check in self.recordings
+            ]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of check.json."""
@@ -45,10 +47,6 @@ class StudyCheck:
             "robot": {"remarks": self.posterior.model.robot.remarks},
             "recordings": [_check_dict(check) for check in self.recordings],
         }
-
-    def __str__(self) -> str:
-        """Return the sentences, one a line."""
-        return "\n".join(self.sentences)
 
 
 def check(study: StudySource | Posterior) -> StudyCheck:

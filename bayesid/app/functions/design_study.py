@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from bayesid._io.progress import Progress, silent
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_design import load_problem, separating
 from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
@@ -20,8 +21,8 @@ from bayesid.report.design_report import design_sentences
 __all__ = ["Designs", "design", "effort_of"]
 
 
-@dataclass(frozen=True)
-class Designs:
+@dataclass(frozen=True, repr=False)
+class Designs(ShortForm):
     """Result of `design`.
 
     Attributes
@@ -45,9 +46,9 @@ class Designs:
         manoeuvres = [motion.to_dict() for motion in self.manoeuvres]
         return {"title": self.title, "seed": self.seed, "manoeuvres": manoeuvres, "best": self.best.name}
 
-    def __str__(self) -> str:
-        """Return what each manoeuvre reaches, one a line."""
-        return "\n".join(design_sentences(self.manoeuvres, self.best))
+    def summary(self) -> Summary:
+        """Return what each manoeuvre reaches, and which is best."""
+        return Summary(design_sentences(self.manoeuvres, self.best))
 
 
 def effort_of(starts: int, iterations: int, thorough: bool) -> Search:

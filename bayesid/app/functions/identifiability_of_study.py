@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.progress import Progress, silent
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_linearisation import LinearisationPoint, fitted_point, missing_part, prepare
 from bayesid.app.study_to_model import load_robot
@@ -20,8 +21,8 @@ from bayesid.robot.robot import Robot
 __all__ = ["Identifiability", "identifiability"]
 
 
-@dataclass(frozen=True)
-class Identifiability:
+@dataclass(frozen=True, repr=False)
+class Identifiability(ShortForm):
     """Result of `identifiability`.
 
     Attributes
@@ -41,13 +42,12 @@ class Identifiability:
     practical: Practical | None
     statement: str
 
-    @property
-    def sentences(self) -> list[str]:
-        """What can be known, how well, and what would tell more."""
+    def summary(self) -> Summary:
+        """Return what can be known, how well, and what would tell more."""
         lines = [structure_sentence(self.structure), self.statement]
         if self.practical is not None:
             lines += [*practical_sentences(self.practical), *advice_sentences(self.practical)]
-        return lines
+        return Summary(lines)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of identifiability.json."""
@@ -61,10 +61,6 @@ class Identifiability:
         unknown = {"basis": "not evaluated", "directions": [], "parameters": [], "advice": []}
         evaluated = unknown if self.practical is None else self.practical.to_dict()
         return {"title": self.title, **structure, **evaluated, "statement": self.statement}
-
-    def __str__(self) -> str:
-        """Return the sentences, one a line."""
-        return "\n".join(self.sentences)
 
 
 def identifiability(

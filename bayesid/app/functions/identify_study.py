@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from emcee.backends import HDFBackend
+
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
@@ -11,6 +13,7 @@ from bayesid.app.functions.study_source import StudySource, recorded_posterior
 from bayesid.inference import identification
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.sampler import Sampler
 
 __all__ = ["identify"]
 
@@ -21,8 +24,9 @@ def identify(
     *,
     effective_samples: float = 4000.0,
     start: Floats | None = None,
+    sampler: Sampler | None = None,
     max_steps: int = 5000,
-    file: Path | None = None,
+    file: str | Path | HDFBackend | None = None,
     progress: Progress = silent,
 ) -> Identification:
     """Identify the unknown bodies and effects by their posterior.
@@ -36,10 +40,12 @@ def identify(
         Goal for the number of effective samples.
     start : (size,) array, optional
         Starting point of the search for the mode, by default the prior's centre.
+    sampler : Sampler, optional
+        What samples the posterior, by default `Emcee`, whose further arguments may be given here.
     max_steps : int
         Largest number of steps of each of emcee's ensembles.
-    file : path, optional
-        HDF5 file of emcee that keeps every step; a run that was interrupted goes on from there.
+    file : path or emcee.backends.HDFBackend, optional
+        File of emcee that keeps every step; a run that was interrupted goes on from there.
     progress : Progress, optional
         Receiver of the fraction done.
 
@@ -56,6 +62,7 @@ def identify(
         seed,
         start=start,
         effective_samples=effective_samples,
+        sampler=sampler,
         max_steps=max_steps,
         file=file,
         progress=progress,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.progress import Progress, silent
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.design.base_prediction import BasePredictor, Prediction
@@ -21,8 +22,8 @@ from bayesid.simulation.model import Manoeuvre, Model
 __all__ = ["Predictions", "predict"]
 
 
-@dataclass(frozen=True)
-class Predictions:
+@dataclass(frozen=True, repr=False)
+class Predictions(ShortForm):
     """Result of `predict`.
 
     Attributes
@@ -39,24 +40,19 @@ class Predictions:
     manoeuvres: tuple[Manoeuvre, ...]
     recordings: tuple[Prediction, ...]
 
-    @property
-    def sentences(self) -> list[str]:
-        """Where the end-effector ends, a sentence for each recording."""
+    def summary(self) -> Summary:
+        """Return where the end-effector ends, a sentence for each recording."""
         lines = []
         for prediction in self.recordings:
             final = prediction.tip.pose().millimetres
             place = ", ".join(format_quantity(float(m), float(s)) for m, s in zip(final.mean, final.sd, strict=True))
             frame = prediction.tip_frame
             lines.append(f"{prediction.name}: {frame} ends at ({place}) mm from where the base started.")
-        return lines
+        return Summary(lines)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of prediction.json."""
         return {"recordings": [prediction.to_dict() for prediction in self.recordings]}
-
-    def __str__(self) -> str:
-        """Return the sentences, one a line."""
-        return "\n".join(self.sentences)
 
 
 def predict(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid._io.words import counted
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_linearisation import lacking_sensors, planned_manoeuvres
@@ -19,8 +20,8 @@ from bayesid.recording.recording import Recording
 __all__ = ["Simulation", "simulate"]
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(ShortForm):
     """Result of `simulate`.
 
     Attributes
@@ -61,12 +62,12 @@ class Simulation:
             "integration": {"step": self.posterior.step, "error_in_sigma": self.integration_error},
         }
 
-    def __str__(self) -> str:
-        """Return a sentence on what was simulated, and how accurately."""
-        return (
-            f"Simulated {counted(len(self.recordings), 'recording')}; integration step {self.posterior.step:g} s, "
-            f"error {self.integration_error:.2g} sigma."
-        )
+    def summary(self) -> Summary:
+        """Return what was simulated, and how accurately."""
+        step, error = self.posterior.step, self.integration_error
+        simulated = counted(len(self.recordings), "recording")
+        said = f"Simulated {simulated}; integration step {step:g} s, error {error:.2g} sigma."
+        return Summary([said])
 
 
 def simulate(study: StudySource | Posterior, seed: int = 0, *, noise: bool = True) -> Simulation:

@@ -86,7 +86,7 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
         frames += [Frame.INERTIAL] if result.before.fit.posterior.model.orbit is None else [Frame.ORBIT, Frame.INERTIAL]
     for frame in frames:
         document.figure(
-            figures.wrench_histories(result.disturbance, frame, cause),
+            figures.plot_disturbance(result, frame),
             f"Reconstructed torque and force, {AXES[frame]} axes.{'' if cause is None else dashed}",
             floating=True,
         )

@@ -42,7 +42,7 @@ def add_decision(document: Document, result: Diagnosis, record: str | None = Non
     verdict = verdict_text(result.verdict)
     document.decision(f"Decision. {verdict[:1].upper()}{verdict[1:]}", decision_entries(result, record))
     document.figure(
-        figures.cause_picture(result, result.strongest_recording),
+        figures.plot_verdict(result),
         "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
         f"{result.recordings[result.strongest_recording]} misses on the axis that "
         "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",

@@ -18,7 +18,7 @@ RECORDINGS = 6  # largest number of further recordings whose residuals are drawn
 def add_evidence(document: Document, result: Diagnosis) -> None:
     """Add the residuals of the strongest recording, the spectra of all, and what the causes gain."""
     document.section("Evidence")
-    sides, strongest = result.residuals, result.strongest_recording
+    strongest = result.strongest_recording
     document.paragraph(
         f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and freed of their "
         "correlation, so that a right model leaves independent values of standard deviation one. "
@@ -29,14 +29,14 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
         )
     )
     document.figure(
-        figures.residual_histories(sides, strongest),
+        figures.plot_residuals(result, strongest),
         f"Residuals in {result.recordings[strongest]}"
         + (", the recording that changes most" if len(result.recordings) > 1 else "")
         + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over a fortieth of the recording.",
         floating=True,
     )
     document.figure(
-        figures.residual_spectra(sides),
+        figures.plot_spectrum(result),
         "Spectra of the residuals, all recordings pooled, frequencies gathered in bins of equal width: white noise has "
         "level one. The lowest bins hold what a disturbance or a wrong body leaves.",
         floating=True,
@@ -50,7 +50,7 @@ def add_other_residuals(document: Document, result: Diagnosis) -> None:
     others = [index for index in range(len(result.recordings)) if index != strongest]
     for index in others[:RECORDINGS]:
         document.figure(
-            figures.residual_histories(result.residuals, index),
+            figures.plot_residuals(result, index),
             f"Residuals in {result.recordings[index]}, sensor axes.",
         )
     if len(others) > RECORDINGS:

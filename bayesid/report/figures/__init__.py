@@ -16,6 +16,15 @@ from bayesid.report.figures.diagnosis_figures import (
     wrench_histories,
     wrench_spectrum,
 )
+from bayesid.report.figures.plots import (
+    plot_disturbance,
+    plot_manoeuvre,
+    plot_posterior,
+    plot_residuals,
+    plot_robot,
+    plot_spectrum,
+    plot_verdict,
+)
 from bayesid.report.figures.posterior_figures import (
     convergence,
     corner,
@@ -31,7 +40,7 @@ from bayesid.report.figures.residual_figures import (
     residual_statistics,
     torques_over_time,
 )
-from bayesid.report.figures.robot_figures import manoeuvre, robot_pose
+from bayesid.report.figures.robot_figures import manoeuvre, robot_pose, robot_shapes
 
 __all__ = [
     "base_motion",
@@ -49,11 +58,19 @@ __all__ = [
     "manoeuvre",
     "measured_against_simulated",
     "parameter_forest",
+    "plot_disturbance",
+    "plot_manoeuvre",
+    "plot_posterior",
+    "plot_residuals",
+    "plot_robot",
+    "plot_spectrum",
+    "plot_verdict",
     "prior_to_posterior",
     "residual_histories",
     "residual_spectra",
     "residual_statistics",
     "robot_pose",
+    "robot_shapes",
     "tip_motion",
     "torques_over_time",
     "trajectory_bands",

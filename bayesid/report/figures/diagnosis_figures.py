@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,6 +22,7 @@ from bayesid.report.figures.figure_style import (
     axis_title,
     curve_style,
     decimal_scale,
+    panels_of,
     residual_limits,
     shared_legend,
     styled,
@@ -29,8 +30,9 @@ from bayesid.report.figures.figure_style import (
     wide_figure,
 )
 from bayesid.report.figures.residual_figures import SIDES, draw_history
-from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, equivalent_box, sticks_of
+from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, sticks_of
 from bayesid.robot.kinematics import kinematics
+from bayesid.robot.link_shapes import equivalent_box
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.sensors import SensorKind
@@ -57,7 +59,7 @@ GIVEN = "#999999"
 
 
 @styled
-def cause_picture(result: Diagnosis, recording: int) -> Figure:
+def cause_picture(result: Diagnosis, recording: int, axes: Any = None) -> Figure:
     """Draw the robot with its causes at the left, and the residual of one axis before and after at the right.
 
     Parameters
@@ -65,25 +67,30 @@ def cause_picture(result: Diagnosis, recording: int) -> Figure:
     result : Diagnosis
     recording : int
         Recording whose residual is drawn, and at whose start the robot is drawn.
+    axes : sequence of Axes, optional
+        Panels of the robot, and of the residual before and, where causes are named, after; by default those of a new
+        figure.
     """
-    figure = wide_figure(2.3)
-    grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
-    _draw_robot(figure.add_subplot(grid[0]), result, recording)
     sides = result.residuals
+    if axes is None:
+        figure = wide_figure(2.3)
+        grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
+        panels = [figure.add_subplot(grid[0])]
+        panels += list(grid[1].subgridspec(len(sides), 1).subplots(squeeze=False, sharex=True)[:, 0])
+    else:
+        figure, given = panels_of(axes, 1, 1 + len(sides), 2.3)
+        panels = list(given[0])
+    _draw_robot(panels[0], result, recording)
     kind, axis = moved_axis(sides, recording)
-    panels = grid[1].subgridspec(len(sides), 1)
     values = [side.series(recording, kind, axis) for side in sides]
-    drawn: list[Axes] = []
-    for place, ((time, value), (name, colour)) in enumerate(zip(values, SIDES, strict=False)):
-        axes = figure.add_subplot(panels[place], sharex=drawn[0] if drawn else None)
+    for axes, (time, value), (name, colour) in zip(panels[1:], values, SIDES, strict=False):
         axes.axhspan(-2.0, 2.0, **BAND)
         draw_history(axes, time, value, colour, name)
         residual_limits(axes, np.concatenate([own for _, own in values]))
         axes.set_title(f"{axis_title(kind, axis)}, {name}" if len(sides) > 1 else axis_title(kind, axis))
         axes.set_ylabel("residual [σ]")
         axes.locator_params(axis="both", nbins=4)
-        drawn.append(axes)
-    drawn[-1].set_xlabel("time [s]")
+    panels[-1].set_xlabel("time [s]")
     return figure
 
 
@@ -237,7 +244,9 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 
 @styled
-def wrench_histories(wrench: DisturbingWrench, frame: Frame, cause: Sequence[Floats] | None = None) -> Figure:
+def wrench_histories(
+    wrench: DisturbingWrench, frame: Frame, cause: Sequence[Floats] | None = None, axes: Any = None
+) -> Figure:
     """Draw a reconstructed torque, and force where it is seen, over time in the axes of one frame, ± 1 sd in base axes.
 
     Parameters
@@ -246,12 +255,13 @@ def wrench_histories(wrench: DisturbingWrench, frame: Frame, cause: Sequence[Flo
     frame : Frame
     cause : sequence of (S, 3) arrays, optional
         Torque of the named causes in each recording, in the same axes, drawn over the reconstructed one.
+    axes : array_like of Axes, optional
+        Panels to draw in, three for the torque and three for the force where it is seen; by default of a new figure.
     """
     families = [("torque", "N m", wrench.torque[frame], wrench.torque_sd)]
     if all(np.isfinite(force).all() for force in wrench.force[frame]):
         families.append(("force", "N", wrench.force[frame], wrench.force_sd))
-    figure = wide_figure(1.8 * len(families))
-    panels = figure.subplots(len(families), 3, squeeze=False, sharex=True)
+    figure, panels = panels_of(axes, len(families), 3, 1.8 * len(families), sharex=True)
     for row, (title, unit, values, spread) in enumerate(families):
         scale, prefix = decimal_scale(np.concatenate([np.abs(value).ravel() for value in values[:FEW]]))
         for axis in range(3):

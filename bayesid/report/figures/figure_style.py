@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from io import BytesIO
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.simulation.sensors import SensorKind
 
@@ -24,11 +26,13 @@ __all__ = [
     "FILL",
     "TRUTH",
     "WIDTH",
+    "PageFigure",
     "PlainLabels",
     "axis_title",
     "curve_style",
     "decimal_scale",
     "ellipse_outline",
+    "panels_of",
     "residual_limits",
     "sensor_panels",
     "sensor_title",
@@ -117,9 +121,47 @@ def title_panel(axes: Axes, text: str) -> None:
     axes.set_title(text, y=1.0)
 
 
+class PageFigure(Figure):
+    """Figure of its own, which notebooks show though pyplot does not know it."""
+
+    def _repr_png_(self) -> bytes:
+        shown = BytesIO()
+        self.savefig(shown, format="png", dpi=110)
+        return shown.getvalue()
+
+
 def wide_figure(height: float) -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
-    return Figure(figsize=(WIDTH, height), layout="constrained")
+    return PageFigure(figsize=(WIDTH, height), layout="constrained")
+
+
+def panels_of(axes: Any, rows: int, columns: int, height: float, **layout: Any) -> tuple[Figure, Any]:
+    """Return a figure and its panels (rows, columns), which are those given or those of a new figure.
+
+    Parameters
+    ----------
+    axes : array_like of matplotlib Axes or None
+        Panels to draw in, row by row.
+    rows, columns : int
+        Numbers of panels that are needed.
+    height : float
+        Height of a new figure [in].
+    layout : object
+        Further arguments of `Figure.subplots` for a new figure.
+
+    Raises
+    ------
+    InputError
+        If another number of axes is given.
+    """
+    if axes is None:
+        figure = wide_figure(height)
+        return figure, figure.subplots(rows, columns, squeeze=False, **layout)
+    given = np.asarray(axes, dtype=object).ravel()
+    if given.size != rows * columns:
+        remedy = f"Give those of matplotlib's subplots({rows}, {columns}), or none for a new figure"
+        raise InputError(f"{given.size} axes are given where {rows * columns} are needed", remedy=remedy)
+    return given[0].get_figure(root=True), given.reshape(rows, columns)
 
 
 def curve_style(index: int) -> dict[str, Any]:
@@ -146,14 +188,14 @@ def axis_title(kind: SensorKind, axis: int) -> str:
     return f"{sensor_title(kind)} {kind.axes[axis]}"
 
 
-def sensor_panels(figure: Figure, kinds: Sequence[SensorKind], sharex: bool = False) -> Any:
-    """Return panels (sensors, axes) with a row for each sensor; those without an axis are hidden."""
+def sensor_panels(axes: Any, kinds: Sequence[SensorKind], height: float, sharex: bool = False) -> tuple[Figure, Any]:
+    """Return a figure and its panels (sensors, axes), as `panels_of`; those without an axis are hidden."""
     columns = max(kind.size for kind in kinds)
-    panels = figure.subplots(len(kinds), columns, squeeze=False, sharex=sharex)
+    figure, panels = panels_of(axes, len(kinds), columns, height, sharex=sharex)
     for row, kind in zip(panels, kinds, strict=True):
-        for axes in row[kind.size :]:
-            axes.set_visible(False)
-    return panels
+        for panel in row[kind.size :]:
+            panel.set_visible(False)
+    return figure, panels
 
 
 def residual_limits(axes: Axes, residual: Floats) -> None:
@@ -165,8 +207,11 @@ def residual_limits(axes: Axes, residual: Floats) -> None:
 def shared_legend(
     figure: Figure, axes: Axes, columns: int, place: str = "outside upper center", markerscale: float = 1.0
 ) -> None:
-    """Put the legend of one panel outside all panels, for all of them."""
+    """Put the legend of one panel outside all panels, for all of them; into it in a figure of somebody else's."""
     handles, labels = axes.get_legend_handles_labels()
+    if not isinstance(figure, PageFigure):
+        axes.legend(handles, labels, markerscale=markerscale)
+        return
     figure.legend(handles, labels, loc=place, ncols=columns, markerscale=markerscale)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,7 +21,9 @@ from bayesid.report.figures.figure_style import (
     COLOURS,
     FILL,
     WIDTH,
+    PageFigure,
     curve_style,
+    panels_of,
     shared_legend,
     styled,
     wide_figure,
@@ -53,17 +56,30 @@ LOOK = {
 
 
 @styled
-def corner(body: BodyDraws) -> Figure:
+def corner(body: BodyDraws, axes: Any = None) -> Figure:
     """Draw the joint distributions of one body's ten quantities about their means, in posterior standard deviations.
 
     The contours hold 50 % and 90 % of the draws.
+
+    Parameters
+    ----------
+    body : BodyDraws
+    axes : (10, 10) array_like of Axes, optional
+        Panels to draw in, of which those above the diagonal are hidden, by default those of a new figure.
     """
     mean, sd = body.mean, body.sd
     scaled = (body.values - mean) / np.where(sd > 0.0, sd, 1.0)
     count = scaled.shape[1]
-    figure = Figure(figsize=(WIDTH, 6.2))
-    figure.subplots_adjust(left=0.075, right=0.88, bottom=0.08, top=0.935, wspace=0.08, hspace=0.08)
-    panels = {(i, j): figure.add_subplot(count, count, i * count + j + 1) for i in range(count) for j in range(i + 1)}
+    if axes is None:
+        figure = PageFigure(figsize=(WIDTH, 6.2))
+        figure.subplots_adjust(left=0.075, right=0.88, bottom=0.08, top=0.935, wspace=0.08, hspace=0.08)
+        places = [(i, j) for i in range(count) for j in range(i + 1)]
+        panels = {(i, j): figure.add_subplot(count, count, i * count + j + 1) for i, j in places}
+    else:
+        figure, given = panels_of(axes, count, count, 6.2)
+        panels = {(i, j): given[i, j] for i in range(count) for j in range(i + 1)}
+        for above in given[np.triu_indices(count, 1)]:
+            above.set_visible(False)
     for (row, column), axes in panels.items():
         if column == row:
             _draw_marginal(axes, scaled[:, row])
@@ -190,7 +206,7 @@ def convergence(result: Identification) -> Figure:
     panels[-1, 1].set_xlabel("rank among all draws")
     text = (
         f"autocorrelation time {format_number(chains.autocorrelation)} steps, largest R-hat {chains.r_hat:.4f}, "
-        f"accepted {100.0 * chains.acceptance:.0f} % of proposals, {chains.effective_samples:.0f} effective samples"
+        f"{chains.effective_samples:.0f} effective samples"
     )
     figure.suptitle(text, fontsize=7.5)
     shared_legend(figure, panels[0, 0], columns=len(chains.z) + 1, place="outside lower center")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -122,7 +122,7 @@ def _paired_panels(rows: Sequence[Sequence[Curves]]) -> Figure:
 
 
 @styled
-def residual_histories(sides: Sequence[ResidualView], recording: int) -> Figure:
+def residual_histories(sides: Sequence[ResidualView], recording: int, axes: Any = None) -> Figure:
     """Draw the residuals of one recording over time, one panel per sensor axis.
 
     Parameters
@@ -131,10 +131,11 @@ def residual_histories(sides: Sequence[ResidualView], recording: int) -> Figure:
         Residuals before, and after where causes are named.
     recording : int
         Index of the recording.
+    axes : array_like of Axes, optional
+        Panels to draw in, a row for each sensor, by default those of a new figure.
     """
     kinds = sides[0].kinds
-    figure = wide_figure(0.45 + 1.2 * len(kinds))
-    panels = sensor_panels(figure, kinds, sharex=True)
+    figure, panels = sensor_panels(axes, kinds, 0.45 + 1.2 * len(kinds), sharex=True)
     for sensor, kind in enumerate(kinds):
         for axis in range(kind.size):
             axes = panels[sensor, axis]
@@ -170,17 +171,18 @@ def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:
 
 
 @styled
-def residual_spectra(sides: Sequence[ResidualView]) -> Figure:
+def residual_spectra(sides: Sequence[ResidualView], axes: Any = None) -> Figure:
     """Draw the spectra of the residuals, one panel per sensor axis; noise alone has level one.
 
     Parameters
     ----------
     sides : sequence of ResidualView
         Residuals before, and after where causes are named.
+    axes : array_like of Axes, optional
+        Panels to draw in, a row for each sensor, by default those of a new figure.
     """
     kinds = sides[0].kinds
-    figure = wide_figure(0.5 + 1.45 * len(kinds))
-    panels = sensor_panels(figure, kinds)
+    figure, panels = sensor_panels(axes, kinds, 0.5 + 1.45 * len(kinds))
     for sensor, kind in enumerate(kinds):
         for axis in range(kind.size):
             axes = panels[sensor, axis]

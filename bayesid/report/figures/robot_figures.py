@@ -8,36 +8,47 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import ConvexHull
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
-from bayesid.report.figures.figure_style import curve_style, shared_legend, styled, wide_figure
-from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.report.figures.figure_style import PageFigure, curve_style, panels_of, shared_legend, styled, wide_figure
+from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
+from bayesid.robot.link_shapes import equivalent_box, link_shapes
 from bayesid.robot.robot import Robot
 
-__all__ = ["VIEWS", "draw_box", "draw_sticks", "equivalent_box", "manoeuvre", "robot_pose", "sticks_of"]
+__all__ = ["VIEWS", "draw_box", "draw_sticks", "manoeuvre", "robot_pose", "robot_shapes", "sticks_of"]
 
+
+FACE = 0.08  # longest edge of a face that is drawn, relative to the size of the robot
+LIGHT = np.array([0.3, -0.5, 0.81])  # direction of the light that shades shapes
+BASE, LINKS = "#8fbcdb", ("#e0b04c", "#b9b9b9")  # colours of the base and, by turns, of the links
 
 VIEWS = (("seen along −z", 0, 1), ("seen along y", 0, 2), ("seen along −x", 1, 2))
 """Title, axis along and axis up of each projection."""
 
 
 @styled
-def manoeuvre(motion: Motion, robot: Robot, time: Floats) -> Figure:
+def manoeuvre(motion: Motion, robot: Robot, time: Floats, axes: Any = None) -> Figure:
     """Draw positions and speeds of the joints over time, one row for each unit (rad, m).
 
     Parameters
     ----------
+    motion : Motion
+    robot : Robot
     time : (T,) array
         Times [s]
+    axes : array_like of Axes, optional
+        Panels of position and speed for each unit, by default those of a new figure.
     """
     state = motion.evaluate(np.asarray(time, dtype=float))
     units = sorted({joint.unit for joint in robot.joints}, reverse=True) or ["rad"]
-    figure = wide_figure(0.3 + 1.65 * len(units))
-    panels = figure.subplots(len(units), 2, squeeze=False, sharex=True)
+    figure, panels = panels_of(axes, len(units), 2, 0.3 + 1.65 * len(units), sharex=True)
     for row, unit in enumerate(units):
         curves = ((state.position, f"position [{unit}]"), (state.velocity, f"speed [{unit}/s]"))
         for column, (values, label) in enumerate(curves):
@@ -51,7 +62,11 @@ def manoeuvre(motion: Motion, robot: Robot, time: Floats) -> Figure:
         axes.set_xlabel("time [s]")
     if robot.joints:
         longest = max(len(joint.name) for joint in robot.joints)
-        figure.legend(loc="outside upper center", ncols=max(1, min(len(robot.joints), 90 // (longest + 8))))
+        if isinstance(figure, PageFigure):
+            figure.legend(loc="outside upper center", ncols=max(1, min(len(robot.joints), 90 // (longest + 8))))
+        else:
+            for axes in panels[:, 0]:
+                axes.legend()
     return figure
 
 
@@ -95,13 +110,59 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
     return figure
 
 
-def equivalent_box(body: InertialParameters) -> Floats:
-    """Return the corners, shape (8, 3), of the homogeneous box with the body's mass, centre of mass and inertia."""
-    moment = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
-    variances, axes = np.linalg.eigh(moment / body.mass)
-    half = np.sqrt(3.0 * np.maximum(variances, 0.0))
-    signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
-    return body.com + (signs * half) @ axes.T
+@styled
+def robot_shapes(robot: Robot, position: Floats, ax: Any = None) -> Figure:
+    """Draw the shapes of all links in space: meshes where they are there, primitives, else equivalent boxes.
+
+    Parameters
+    ----------
+    robot : Robot
+    position : (joints,) array
+        Positions of the joints [rad or m].
+    ax : Axes3D, optional
+        Axes in space, by default those of a new figure.
+    """
+    if ax is None:
+        figure = wide_figure(4.2)
+        ax = figure.add_subplot(projection="3d")
+    elif not hasattr(ax, "zaxis"):
+        raise InputError("the axes are flat", remedy='Make them by figure.add_subplot(projection="3d")')
+    state = np.array(position, dtype=float).reshape(1, -1)
+    pose = kinematics(robot, JointState(state, 0.0 * state, 0.0 * state)).pose[0]
+    faces, colours, links = [], [], []
+    for shape in link_shapes(robot):
+        link = robot.link(shape.link)
+        placed = (np.eye(4) if link.joint < 0 else pose[link.joint]) @ link.placement
+        faces.append(shape.triangles @ placed[:3, :3].T + placed[:3, 3])
+        links.append(link.joint)
+    everything = np.concatenate(faces)
+    low, high = everything.min(axis=(0, 1)), everything.max(axis=(0, 1))
+    # matplotlib draws the farthest first, by the middle of each face: large ones would hide what is before them
+    faces = [_split(corners, FACE * float((high - low).max())) for corners in faces]
+    for corners, joint in zip(faces, links, strict=True):
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        bright = np.abs(normal @ LIGHT) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+        colours.append(np.outer(0.55 + 0.45 * bright, to_rgb(BASE if joint < 0 else LINKS[joint % 2])))
+    drawn, shades = np.concatenate(faces), np.concatenate(colours)
+    ax.add_collection3d(Poly3DCollection(drawn, facecolors=shades, edgecolors=shades, linewidths=0.2, rasterized=True))
+    middle, reach = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.2 * float((high - low).max()))
+    for axis, place, half in zip("xyz", middle, reach, strict=True):
+        getattr(ax, f"set_{axis}lim")(place - half, place + half)
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]")
+        ax.locator_params(axis=axis, nbins=4)
+    ax.set_box_aspect(reach, zoom=1.0)
+    return ax.get_figure(root=True)
+
+
+def _split(triangles: Floats, longest: float) -> Floats:
+    """Return triangles (T, 3, 3) of edges no longer than a length, those with longer ones cut in four."""
+    large = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1, initial=0.0) > longest
+    if not large.any():
+        return triangles
+    corners = triangles[large]
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))  # of the edges from each corner to the next
+    cut = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+    return np.concatenate([triangles[~large], *(_split(part, longest) for part in [*cut, middles])])
 
 
 def sticks_of(robot: Robot, pose: Floats) -> list[Floats]:
