@@ -113,3 +113,19 @@ def test_objects_do_as_well_as_a_study(study):
     assert as_json(bayesid.simulate(posterior, seed=4)) == as_json(bayesid.simulate(study, seed=4))
     (recording,) = bayesid.predict(posterior.model, posterior.manoeuvres, 4, draws=20).recordings
     assert recording.to_dict() == bayesid.predict(study, seed=4, draws=20).recordings[0].to_dict()
+
+
+@pytest.mark.slow
+def test_the_session_of_the_readme_runs(study, tmp_path, monkeypatch, capsys):
+    text = Path(__file__).parents[1].joinpath("README.md").read_text(encoding="utf-8")
+    code = text.partition("## In Python")[2].partition("```python\n")[2].partition("```")[0]
+    for file in study.parent.glob("*.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    session: dict[str, object] = {}
+    exec(code, session)
+    assert capsys.readouterr().out.startswith("Verdict: ")
+    assert session["base"] is session["found"].identification.bodies["base_link"]
+    assert "sample_stats" in session["tree"].children
+    assert Robot.from_urdf("identified.urdf").base == "base_link"
+    assert Path("verdict.png").stat().st_size > 10_000

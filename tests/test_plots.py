@@ -65,9 +65,9 @@ def test_links_have_meshes_primitives_or_the_box_of_their_inertia(shaped: Robot)
 
 def test_a_robot_is_drawn_in_its_pose(shaped: Robot) -> None:
     (axes,) = bayesid.plot_robot(shaped, [0.0, 0.5 * np.pi]).axes
-    # the box reaches from -1 to 3; the cylinder lies along x after a quarter turn about y
-    np.testing.assert_allclose([axes.get_xlim(), axes.get_ylim()], [(-1.5, 3.0), (-1.0, 1.0)], atol=1e-6)
-    assert axes.get_zlim()[0] == pytest.approx(-3.0)
+    # the base reaches from -1 to 3, the mesh to y = 2; the cylinder lies along x after a quarter turn about y
+    limits = [axes.get_xlim(), axes.get_ylim(), axes.get_zlim()]
+    np.testing.assert_allclose(limits, [(-1.5, 3.0), (-1.0, 2.0), (-3.0, 7.0)], atol=0.3)
     flat = Figure().subplots()
     with pytest.raises(bayesid.InputError, match="the axes are flat"):
         bayesid.plot_robot(shaped, ax=flat)

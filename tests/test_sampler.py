@@ -58,7 +58,7 @@ class Nuts:
 
 def likelihood_within(posterior, z):
     """Log likelihood, low and finite where the simulation has no finite readings."""
-    return np.nan_to_num(posterior.log_likelihood(z), nan=-1e300, neginf=-1e300)
+    return np.nan_to_num(posterior.log_likelihood(z), neginf=-1e300)
 
 
 class Dynesty:

@@ -65,7 +65,7 @@ class Optimum:
         """Return the Laplace approximation of the log evidence."""
         n = posterior.size
         half_logdet = float(np.log(np.diag(np.linalg.cholesky(self.covariance))).sum())
-        return float(posterior.log_density(self.z)) + 0.5 * n * np.log(2.0 * np.pi) + half_logdet
+        return float(posterior.log_density(self.z[None])[0]) + 0.5 * n * np.log(2.0 * np.pi) + half_logdet
 
 
 def fit(posterior: Posterior, start: Floats, at_most: int = MOST_EVALUATIONS) -> Optimum:

@@ -196,9 +196,10 @@ class Posterior:
         return 0.0 * squares if self.flat_prior else -0.5 * squares - 0.5 * self.size * np.log(2.0 * np.pi)
 
     def log_likelihood(self, z: Floats) -> Floats:
-        """Return the log likelihood of all recordings, shape (..., size) -> (...); not finite where nothing moves."""
+        """Return the log likelihood of all recordings, shape (..., size) -> (...), minus infinity as `log_density`."""
         z = np.asarray(z, dtype=float)
-        return self.log_likelihoods(z.reshape(-1, self.size)).sum(axis=1).reshape(z.shape[:-1])[()]
+        total = self.log_likelihoods(z.reshape(-1, self.size)).sum(axis=1)
+        return np.where(np.isfinite(total), total, -np.inf).reshape(z.shape[:-1])[()]
 
     def log_density(self, z: Floats) -> Floats:
         """Return the normalised log prior plus the log likelihood, shape (..., size) -> (...).

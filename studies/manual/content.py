@@ -23,6 +23,7 @@ from bayesid.report.effect_catalogue import CatalogueEntry, catalogue
 from bayesid.report.numbers import format_text
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.register import known_effects
+from studies.manual import interface
 
 Pieces = list[str]  # a text in pieces: plain, code, plain, and so on
 
@@ -52,6 +53,8 @@ def content() -> dict[str, Any]:
             and (callable(value) or isinstance(value, (property, classmethod)))
         ],
         "studies": list(_studies()),
+        "functions": [_in_pieces(entry) for entry in interface.functions()],
+        "classes": [_in_pieces(entry) for entry in interface.classes()],
     }
 
 
@@ -195,6 +198,16 @@ def _studies() -> Iterator[dict[str, Any]]:
         name = file.parent.name
         if name != "manual":
             yield {"name": name, "text": _first(importlib.import_module(f"studies.{name}"))}
+
+
+def _in_pieces(entry: Any) -> Any:
+    """Return an entry of the interface whose texts, wherever they stand in it, are in pieces."""
+    if isinstance(entry, list):
+        return [_in_pieces(part) for part in entry]
+    return {
+        key: _pieces(value) if key == "text" else _in_pieces(value) if isinstance(value, list) else value
+        for key, value in entry.items()
+    }
 
 
 def _first(described: Any) -> Pieces:
