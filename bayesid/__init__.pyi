@@ -150,4 +150,5 @@ from bayesid.simulation.sensors import (
     White as White,
 )
 
+__all__: list[str]
 __version__: str

@@ -79,7 +79,7 @@ def as_json(result: object) -> dict:
     [
         ("check", "check.json", {}),
         ("simulate", "simulation.json", {"seed": 4}),
-        ("predict", "prediction.json", {"seed": 4, "draws": 20}),
+        pytest.param(*("predict", "prediction.json", {"seed": 4, "draws": 20}), marks=pytest.mark.slow),
         pytest.param(
             *("identify", "identification.json", {"seed": 4, "effective_samples": 100.0}), marks=pytest.mark.slow
         ),
@@ -108,6 +108,7 @@ def test_a_robot_alone_has_a_structure(tmp_path):
     assert "Practical identifiability is not evaluated: no recordings are given." in str(result)
 
 
+@pytest.mark.slow
 def test_objects_do_as_well_as_a_study(study):
     posterior = bayesid.load_posterior(bayesid.Study.load(study))
     assert as_json(bayesid.simulate(posterior, seed=4)) == as_json(bayesid.simulate(study, seed=4))

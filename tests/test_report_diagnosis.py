@@ -868,7 +868,7 @@ def test_plots_of_a_diagnosis_take_axes(biased, disturbance):
 
 def test_a_diagnosis_is_shown_by_its_verdict_and_its_causes(biased, clean):
     text, html = repr(biased), biased._repr_html_()
-    assert text.startswith("Verdict: explained, accel-bias (1).")
+    assert text.startswith("Verdict: explained, accel-bias (probability > 0.999).")
     row = next(line for line in text.splitlines() if line.startswith("accel-bias "))
     assert all(f"{axis} " in row for axis in "xyz")
     assert "m/s2" in row

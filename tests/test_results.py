@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid import Identification, PosteriorDraws, Robot
-from bayesid._io.short_form import ShortForm, Summary, format_spread
+from bayesid._io.short_form import ShortForm, Summary, format_probability, format_spread
 from bayesid.inference.body_quantities import BODY_QUANTITIES, body_dict
 from bayesid.inference.importance import Evidence
 from bayesid.inference.mode import Optimum
@@ -94,3 +94,9 @@ def test_short_forms_are_safe_and_aligned():
 )
 def test_a_mean_has_the_decimals_of_its_standard_deviation(mean, sd, unit, text):
     assert format_spread(mean, sd, unit) == text
+
+
+def test_a_probability_is_never_rounded_to_certainty():
+    assert [format_probability(p) for p in (0.0, 5e-4, 0.0304, 0.9994, 1.0)] == [
+        *("< 0.001", "< 0.001", "0.030", "> 0.999", "> 0.999")
+    ]

@@ -7,7 +7,7 @@ from html import escape
 from math import floor, isfinite, log10
 from typing import NamedTuple
 
-__all__ = ["ShortForm", "Summary", "format_spread"]
+__all__ = ["ShortForm", "Summary", "format_probability", "format_spread"]
 
 
 class Summary(NamedTuple):
@@ -49,6 +49,13 @@ class ShortForm:
         table = [("th", header), *(("td", row) for row in rows)] if rows else []
         lines = ("".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in row) for tag, row in table)
         return text + (f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>" if rows else "")
+
+
+def format_probability(probability: float) -> str:
+    """Return a probability to three decimals, and of one that rounds to 0 or 1 that it is less or more."""
+    if probability > 0.999:
+        return "> 0.999"
+    return "< 0.001" if probability < 0.001 else f"{probability:.3f}"
 
 
 def format_spread(mean: float, sd: float, unit: str) -> str:

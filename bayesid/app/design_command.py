@@ -62,13 +62,21 @@ def run(
     progress(0.0, "compiling")
     effort = effort_of(starts, iterations, thorough)
     key = content_key(bayesid.__version__, *study.defining_files, seed, effort, *(separate or ()))
-    asked = {"starts": starts, "iterations": iterations, "thorough": thorough}
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)
         try:
             with executor_at(scheduler) if scheduler else nullcontext() as executor:
-                searching = {"encoder": noise, "executor": executor, "store": store, "progress": progress}
-                result = design(problem, seed, **asked, **searching)
+                result = design(
+                    problem,
+                    seed,
+                    starts=starts,
+                    iterations=iterations,
+                    thorough=thorough,
+                    encoder=noise,
+                    executor=executor,
+                    store=store,
+                    progress=progress,
+                )
         except InputError as error:
             raise error.within(file=file) from None
         result = replace(result, title=study.title)
@@ -76,7 +84,8 @@ def run(
             write_json(folder / "design.json", result.to_dict())
             for motion in result.manoeuvres:
                 write_motion(motion, folder / f"{motion.name}.csv")
-            origin = report_origin(study, "design", seed, output=output, **asked, separate=separate)
+            asked = (("starts", starts), ("iterations", iterations), ("thorough", thorough))
+            origin = report_origin(study, "design", seed, output=output, **dict(asked), separate=separate)
             design_report(result.manoeuvres, result.best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
     yield from result.summary().sentences

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
-from bayesid._io.short_form import ShortForm, Summary, format_spread
+from bayesid._io.short_form import ShortForm, Summary, format_probability, format_spread
 from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.design.design_result import Design
@@ -272,11 +272,16 @@ class Diagnosis(ShortForm):
     def summary(self) -> Summary:
         """Return the verdict, what it gains, and the candidates that are named or probable to one per cent."""
         verdict, probabilities, gain = self.verdict, self.probabilities, self.gain
-        named = [f"{name} ({self.cause_probability(name):.3g})" for name in verdict.causes if name != UNKNOWN]
+        named = [
+            f"{name} (probability {format_probability(self.cause_probability(name))})"
+            for name in verdict.causes
+            if name != UNKNOWN
+        ]
         sentences = [
             f"Verdict: {verdict.status.value}" + (f", {joined(named)}." if named else "."),
-            f"Probability of nothing {probabilities.nothing:.3g}, of what is in no catalogue "
-            f"{probabilities.unknown:.3g}; of something unnamed {self.remainder.probability:.3g}.",
+            f"Probability of nothing {format_probability(probabilities.nothing)}, of something outside the catalogue "
+            f"{format_probability(probabilities.unknown)}, beside the named causes "
+            f"{format_probability(self.remainder.probability)}.",
             f"Chi-square per sample {gain.before.chi2_per_sample:.4g}"
             + (f", with the causes {gain.after.chi2_per_sample:.4g}." if named else "."),
         ]
@@ -286,7 +291,7 @@ class Diagnosis(ShortForm):
                 after = amplitudes_of(self.after, row.name) if row.name in verdict.causes else None
                 sizes = zip(row.quantities, row.mean, row.sd, strict=True) if after is None else after
                 text = ", ".join(f"{key} {format_spread(mean, sd, unit)}" for (key, unit), mean, sd in sizes)
-                rows.append((row.name, f"{row.probability:.3g}", f"{row.signal_to_noise:.1f}", text))
+                rows.append((row.name, format_probability(row.probability), f"{row.signal_to_noise:.1f}", text))
         return Summary(sentences, ("cause", "probability", "signal/noise", "size"), rows)
 
     def to_dict(self) -> dict[str, Any]:

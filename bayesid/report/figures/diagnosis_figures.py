@@ -19,6 +19,7 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.report.figures.figure_style import (
     BAND,
     COLOURS,
+    PageFigure,
     axis_title,
     curve_style,
     decimal_scale,
@@ -90,7 +91,8 @@ def cause_picture(result: Diagnosis, recording: int, axes: Any = None) -> Figure
         axes.set_title(f"{axis_title(kind, axis)}, {name}" if len(sides) > 1 else axis_title(kind, axis))
         axes.set_ylabel("residual [σ]")
         axes.locator_params(axis="both", nbins=4)
-    panels[-1].set_xlabel("time [s]")
+    for axes in panels[-1:] if isinstance(figure, PageFigure) else panels[1:]:
+        axes.set_xlabel("time [s]")
     return figure
 
 

@@ -71,7 +71,7 @@ def corner(body: BodyDraws, axes: Any = None) -> Figure:
     scaled = (body.values - mean) / np.where(sd > 0.0, sd, 1.0)
     count = scaled.shape[1]
     if axes is None:
-        figure = PageFigure(figsize=(WIDTH, 6.2))
+        figure: Figure = PageFigure(figsize=(WIDTH, 6.2))
         figure.subplots_adjust(left=0.075, right=0.88, bottom=0.08, top=0.935, wspace=0.08, hspace=0.08)
         places = [(i, j) for i in range(count) for j in range(i + 1)]
         panels = {(i, j): figure.add_subplot(count, count, i * count + j + 1) for i, j in places}

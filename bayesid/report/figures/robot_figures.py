@@ -26,6 +26,7 @@ __all__ = ["VIEWS", "draw_box", "draw_sticks", "manoeuvre", "robot_pose", "robot
 
 
 FACE = 0.08  # longest edge of a face that is drawn, relative to the size of the robot
+GLASS = 0.3  # opacity of a box in place of the base's shape, which may hold other links
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction of the light that shades shapes
 BASE, LINKS = "#8fbcdb", ("#e0b04c", "#b9b9b9")  # colours of the base and, by turns, of the links
 
@@ -134,17 +135,20 @@ def robot_shapes(robot: Robot, position: Floats, ax: Any = None) -> Figure:
         link = robot.link(shape.link)
         placed = (np.eye(4) if link.joint < 0 else pose[link.joint]) @ link.placement
         faces.append(shape.triangles @ placed[:3, :3].T + placed[:3, 3])
-        links.append(link.joint)
+        links.append((link.joint, GLASS if link.joint < 0 and shape.source == "box" else 1.0))
     everything = np.concatenate(faces)
     low, high = everything.min(axis=(0, 1)), everything.max(axis=(0, 1))
     # matplotlib draws the farthest first, by the middle of each face: large ones would hide what is before them
-    faces = [_split(corners, FACE * float((high - low).max())) for corners in faces]
-    for corners, joint in zip(faces, links, strict=True):
+    longest = FACE * float((high - low).max())
+    faces = [_split(part, longest) if alpha == 1.0 else part for part, (_, alpha) in zip(faces, links, strict=True)]
+    for corners, (joint, alpha) in zip(faces, links, strict=True):
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         bright = np.abs(normal @ LIGHT) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
-        colours.append(np.outer(0.55 + 0.45 * bright, to_rgb(BASE if joint < 0 else LINKS[joint % 2])))
+        shade = np.outer(0.55 + 0.45 * bright, to_rgb(BASE if joint < 0 else LINKS[joint % 2]))
+        colours.append(np.column_stack([shade, np.full(len(shade), alpha)]))
     drawn, shades = np.concatenate(faces), np.concatenate(colours)
-    ax.add_collection3d(Poly3DCollection(drawn, facecolors=shades, edgecolors=shades, linewidths=0.2, rasterized=True))
+    shown = {"linewidths": 0.0, "antialiased": False, "rasterized": True}
+    ax.add_collection3d(Poly3DCollection(drawn, facecolors=shades, **shown))
     middle, reach = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.2 * float((high - low).max()))
     for axis, place, half in zip("xyz", middle, reach, strict=True):
         getattr(ax, f"set_{axis}lim")(place - half, place + half)
