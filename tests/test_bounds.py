@@ -16,6 +16,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import relative_coordinates
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize, beyond_joint, half_edges, link_radius
+from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects import Effect, Parameter, PhysicalBound, Prior, bounds_by_label, create, known_effects
 from bayesid.simulation.effects.environment_effects import SURGE, largest_density
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -39,6 +40,7 @@ ROBOTS = {
     "planar": Robot.shipped("planar"),
     **{file.stem: Robot.from_urdf(file) for file in (SERVICER3, SERVICER4, BRANCHED)},
 }
+ROBOTS = {name: robot.with_wheel(Wheel("wheel1", (0.0, 0.0, 1.0), 0.01)) for name, robot in ROBOTS.items()}
 ETS7 = ROBOTS["ets7"]
 
 
@@ -107,7 +109,7 @@ def test_the_linear_form_of_an_effect_has_the_same_bounds():
     attached = [effect.attach(model.robot) for effect in every_effect(model)]
     linear = [(effect, effect.in_amplitudes()) for effect in attached]
     changed = [(effect, form) for effect, form in linear if form is not effect]
-    names = {"aerodynamic-drag", "solar-pressure", "joint-flexibility", "payload"}
+    names = {"aerodynamic-drag", "solar-pressure", "joint-flexibility", "payload", "wheel-inertia"}
     assert {effect.name for effect, _ in changed} == names
     for effect, form in changed:
         assert form.physical_bounds(model) == effect.physical_bounds(model)
@@ -458,7 +460,8 @@ def test_what_the_truths_hide_is_plausible(case):
 
 
 def test_every_effect_of_the_catalogue_is_among_them():
-    """All shipped effects but torque sensors, for which no truth is written, and gravity without a size."""
+    """All shipped effects but torque sensors, gravity without a size, and wheels, which have truths of their own."""
     shown = {cause.partition(":")[0] for case in CASES for cause in case.causes}
     shipped = {name for name, kind in known_effects().items() if kind.__module__.startswith("bayesid.")}
-    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias"}
+    wheels = {"wheel-inertia", "wheel-tilt", "wheel-latency", "wheel-imbalance"}  # tests/test_wheel_faults.py
+    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias", *wheels}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,11 +16,16 @@ import pytest
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.candidates.cause_kind import kind_of
+from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import Motion
+from bayesid.recording.recording import Recording
+from bayesid.recording.sampled_curve import SampledCurve
+from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.log_cholesky import relative
 from bayesid.robot.robot import Robot
+from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, create, known_effects
 from bayesid.simulation.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -29,7 +35,10 @@ from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 
-ROBOT = Robot.from_urdf(Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf")
+WHEEL = Wheel("wheel1", (0.0, 0.6, 0.8), 0.5, (0.1, 0.2, -0.3))
+ROBOT = Robot.from_urdf(
+    Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
+).with_wheel(WHEEL)
 ORBIT = Orbit(6.9e6, 0.01, inclination=0.9, sun=(0.6, 0.0, 0.8))
 SENSORS = (
     Sensor(SensorKind.RATE, White(1e-5)),
@@ -113,6 +122,8 @@ def instant() -> Instant:
         vector(),
         vector(),
         jnp.zeros(6),
+        jnp.asarray(rng.normal(size=(1, 5))),
+        jnp.ones(()),
     )
     attitude = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     return Instant(environment, body, jnp.asarray(attitude * np.linalg.det(attitude)), *(vector() * 0.01,) * 3)
@@ -283,7 +294,7 @@ def check_places(effect: Effect, hook: str) -> None:
 def check_lacks(effect: Effect, hook: str) -> None:
     """A model without orbit and without the sensor lacks what it says, so that the effect occurs nowhere in it."""
     others = tuple(sensor for sensor in SENSORS if sensor.kind != getattr(effect, "sensor", None))
-    poor, kind = Model(ROBOT, others, UNKNOWN), type(effect)
+    poor, kind = Model(replace(ROBOT, wheels=()), others, UNKNOWN), type(effect)
     assert kind.lacks(PLAIN) is None
     assert kind.lacks(poor)
     assert not kind.instances(poor)
@@ -357,7 +368,7 @@ def check_quantities(effect: Effect, hook: str) -> None:
 def check_label(effect: Effect, hook: str) -> None:
     name, _, place = effect.label.partition(":")
     assert name == effect.name
-    assert not place or place in {*ROBOT.links, *JOINTS, *"xyz"}
+    assert not place or place in {*ROBOT.links, *JOINTS, *"xyz", WHEEL.name}
 
 
 def check_candidate(effect: Effect, hook: str) -> None:
@@ -465,6 +476,17 @@ def check_in_study(effect: Effect, hook: str) -> None:
     assert effect.in_study(100.0, True) is None
 
 
+def check_shows_in(effect: Effect, hook: str) -> None:
+    """The line of a wheel shows where it lies below half the sampling rate, and nowhere else."""
+    time = np.arange(0.0, 10.0, 0.1)
+    channels = {f"rate.{axis}": 0.0 * time for axis in "xyz"}
+    slow, fast = (
+        Recording("r", None, time, {**channels, "wheel_speed.wheel1": speed + 0.0 * time}) for speed in (20, 40)
+    )
+    assert effect.shows_in([fast, slow])
+    assert not effect.shows_in([fast])
+
+
 def check_members(effect: Effect, hook: str) -> None:
     """All that the registration of the class makes known is known, the effect among it."""
     names = {member.name for member in type(effect).members()}
@@ -509,6 +531,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "cause_kind": check_cause_kind,
     "reach_of_swing": check_reach_of_swing,
     "in_study": check_in_study,
+    "shows_in": check_shows_in,
     "members": check_members,
 }
 FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units", "instants", "at"}
@@ -582,6 +605,7 @@ class Flight:
     def __init__(self, model: Model, recordings: int = 1) -> None:
         self.model, self.recordings = model, recordings
         samples = np.linspace(0.0, 6.0, 25)
+        speed = SampledCurve(np.arange(7.0), np.array([[0.1], [0.3], [0.5], [0.4], [0.0], [-0.2], [0.1]]))
         grid = build_grid(
             ROBOT,
             ("link2",),
@@ -590,6 +614,7 @@ class Flight:
             0.25,
             orbit=ORBIT,
             argument_of_latitude=0.7,
+            actions=Actions.none(WheelMotion.planned([WHEEL], {WHEEL.name: speed})),
             effects=model.effects,
             torques=model.torque is not None,
         )

@@ -121,7 +121,6 @@ def test_the_release_notes_have_the_version(text):
 
 PLANNED = {
     *("thruster-pulses", "kicks", "thermal-snap", "rate-bias-jump", "accel-bias-jump", "joint-backlash:JOINT"),
-    *("wheel-inertia:WHEEL", "wheel-imbalance:WHEEL"),
 }
 """Causes that the contract names and the catalogue does not have yet."""
 

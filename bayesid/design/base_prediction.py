@@ -217,4 +217,8 @@ def _first_rate(model: Model, recording: Recording) -> Floats:
 
 
 def _quaternions(turn: Floats) -> Floats:
+    if not np.isfinite(turn).all():
+        problem = "some draws of the prior give no finite motion: it holds bodies that would whirl"
+        remedy = "Take the posterior of an identification as prior (unknowns.posterior), or a narrower spread"
+        raise InputError(problem, place="unknowns.spread", remedy=remedy)
     return Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat().reshape(*turn.shape[:2], 4)

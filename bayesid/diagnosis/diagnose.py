@@ -155,7 +155,8 @@ def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bo
     recordings = [manoeuvre.recording for manoeuvre in manoeuvres]
     wheels = any(recording.wheels or "wheel_momentum.x" in recording.channels for recording in recordings)
     longest = max(float(recording.time[-1]) for recording in recordings)
-    return candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
+    possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
+    return [effect for effect in possible if effect.shows_in(recordings)]
 
 
 def identify_extended(

@@ -12,6 +12,7 @@ from bayesid.diagnosis.noise import noise_faults
 from bayesid.report.numbers import format_number, format_text, format_unit
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
+from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
 from bayesid.simulation.effects.register import known_effects
@@ -35,7 +36,7 @@ class CatalogueEntry:
     Attributes
     ----------
     name : str
-        Name as in study files, with LINK, JOINT or AXIS where a place follows.
+        Name as in study files, with LINK, JOINT, WHEEL or AXIS where a place follows.
     summary, separated_by : str
         What the effect is, and what tells it from others.
     parameters : tuple of str
@@ -87,8 +88,8 @@ def entry_of(name: str, entries: Sequence[CatalogueEntry]) -> CatalogueEntry:
 
 
 def example_model(*, torque: bool = False) -> Model:
-    """Return a model in which effects can occur: ETS-VII in orbit with all sensors, those of the torques if wanted."""
-    robot = Robot.shipped(EXAMPLE)
+    """Return a model in which effects can occur: ETS-VII in orbit with a wheel and all sensors, also of torques."""
+    robot = Robot.shipped(EXAMPLE).with_wheel(Wheel("wheel1", (0.0, 0.0, 1.0), 0.1, (0.5, 0.0, 0.0)))
     joints = tuple(joint.name for joint in robot.joints)
     return Model(
         robot,
@@ -129,6 +130,8 @@ def _name(effect: Effect, robot: Robot) -> str:
         return name
     if place in robot.links:
         return f"{name}:LINK"
+    if place in [wheel.name for wheel in robot.wheels]:
+        return f"{name}:WHEEL"
     return f"{name}:JOINT" if place in [joint.name for joint in robot.joints] else f"{name}:AXIS"
 
 
@@ -183,6 +186,7 @@ def _in_orbit(change: Callable[[Orbit], Orbit]) -> Callable[[Model], Model]:
 
 
 TAKEN_AWAY: dict[str, Callable[[Model], Model]] = {
+    "[[robot.wheels]]": lambda model: replace(model, robot=replace(model.robot, wheels=())),
     "[orbit]": lambda model: replace(model, orbit=None),
     "inclination in [orbit]": _in_orbit(lambda orbit: replace(orbit, inclination=None)),
     "sun in [orbit]": _in_orbit(lambda orbit: replace(orbit, sun=None)),

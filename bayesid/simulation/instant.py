@@ -61,6 +61,8 @@ class Environment(NamedTuple):
     wheels : (W, 5) array
         Angle, speed and its three derivatives of each wheel whose speed is recorded
         (`bayesid.recording.wheel_motion.COURSE`).
+    sampled : scalar array
+        One where sensors are read; zero at the nodes of the integration, between which fast lines average out.
     """
 
     time: Traceable
@@ -74,6 +76,7 @@ class Environment(NamedTuple):
     wheel_torque: Traceable
     wrench: Traceable
     wheels: Traceable = np.zeros((0, 5))
+    sampled: Traceable = 1.0
 
 
 class Instant(NamedTuple):

@@ -87,11 +87,12 @@ def build_grid(
         time_tables(robot, unknown, effects, motion, time, orbit, argument_of_latitude, actions, sampled)
         for time, sampled in ((node, False), (samples, torques))
     ]
+    at_nodes = instants[0].environment._replace(sampled=np.zeros(len(node)))
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
     return Grid(
         step=size,
-        node=instants[0],
+        node=instants[0]._replace(environment=at_nodes),
         zero_order_hold=actions.zero_order_hold(nodes[:-1]),
         sample=instants[1],
         step_of=index.astype(np.int32),
@@ -156,9 +157,8 @@ def time_tables(
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
     state = none if orbit is None else orbit.state(time, argument_of_latitude)
     momentum, torque = actions.wheels(time)
-    environment = Environment(
-        time, *state, momentum, torque, wrench=np.zeros((len(time), 6)), wheels=actions.spun.courses(time)
-    )
+    known_actions = np.zeros((len(time), 6)), actions.spun.courses(time), np.ones(len(time))
+    environment = Environment(time, *state, momentum, torque, *known_actions)
     xp = namespace(known, *(table for _, table in tables))
     coefficients = xp.concatenate([np.zeros((len(time), WIDTH, 0)), *(table for _, table in tables)], axis=2)
     beyond = no_joints(len(time), len(owners))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from studies.truth.bodies import Body, read_urdf, write_urdf, wrong_guess
 from studies.truth.mujoco.model import TruthModel
@@ -120,13 +121,16 @@ class SlewStudy(NamedTuple):
     truths: tuple[Truth, ...]
 
 
+def off_axis(axis: Array) -> Array:
+    """Return the direction across an axis in which imbalances lie at angle zero."""
+    across = np.cross(axis, [0.3, -0.5, 0.8])
+    return np.asarray(across / np.linalg.norm(across))
+
+
 def driven(wheel: Mounted, fault: Fault, course: Callable[[float], tuple[float, float, float]]) -> DrivenWheel:
     """Return a wheel as it truly is."""
-    from scipy.spatial.transform import Rotation
-
     true = Rotation.from_rotvec([*fault.tilt, 0.0]).as_matrix() @ np.array(wheel.axis)
-    across = np.cross(true, [0.3, -0.5, 0.8])
-    across /= np.linalg.norm(across)
+    across = off_axis(true)
     x, y, z = true.tolist()
     return DrivenWheel(
         (x, y, z),
@@ -175,7 +179,7 @@ def write_slews(
         model = TruthModel(urdf, wheels=true, accel_position=slews.accel_position)
         base = model.base
         rate = 2e-3 * generator.standard_normal(3)
-        truth = model.run(_still, times, rate0=rate, attitude0=attitudes[-1], step=slews.step)
+        truth = model.run(still, times, rate0=rate, attitude0=attitudes[-1], step=slews.step)
         truths.append(truth)
         table: Table = {}
         for name, values, sigma in (("rate", truth.rate, slews.rate_sigma), ("accel", truth.accel, slews.accel_sigma)):
@@ -193,7 +197,8 @@ def write_slews(
     return SlewStudy(file, base, tuple(truths))
 
 
-def _still(time: float) -> tuple[Array, Array, Array]:
+def still(time: float) -> tuple[Array, Array, Array]:
+    """Motion of no joints."""
     return np.zeros(0), np.zeros(0), np.zeros(0)
 
 

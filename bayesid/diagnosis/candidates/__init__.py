@@ -5,7 +5,8 @@ from bayesid.diagnosis.candidates.generic_cause import GenericCause
 from bayesid.diagnosis.candidates.initial_rate import InitialRate
 from bayesid.diagnosis.candidates.instant_cause import MassShiftCause
 from bayesid.diagnosis.candidates.linear_cause import LinearCause
+from bayesid.diagnosis.candidates.order_cause import OrderLineCause
 from bayesid.diagnosis.candidates.vibration_cause import VibrationCause
 
-for _kind in (LinearCause(), InitialRate(), VibrationCause(), MassShiftCause(), GenericCause()):
+for _kind in (LinearCause(), InitialRate(), VibrationCause(), MassShiftCause(), OrderLineCause(), GenericCause()):
     register_kind(_kind)

@@ -41,6 +41,8 @@ class Signatures:
         Frequency [Hz] and damping ratio of a vibration.
     instants : tuple of float, optional
         Instant of a jump in each recording [s], infinite where it does not jump.
+    order : float, optional
+        Order of a line: its speed over that of a wheel.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Signatures:
     recording: int | None = None
     tone: tuple[float, float] | None = None
     instants: tuple[float, ...] | None = None
+    order: float | None = None
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.wheel_history import WheelHistory
+from bayesid.simulation.effects.wheel_faults import WheelImbalance, WheelInertia, WheelLatency, WheelTilt
 from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wrench
 
 # isort: on
@@ -76,7 +77,11 @@ __all__ = [
     "ThrusterLeak",
     "TorqueBias",
     "WheelHistory",
+    "WheelImbalance",
+    "WheelInertia",
+    "WheelLatency",
     "WheelMomentum",
+    "WheelTilt",
     "Wrench",
     "bounds_by_label",
     "create",

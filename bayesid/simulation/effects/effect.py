@@ -19,6 +19,7 @@ from jax import Array
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
+from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Quantity, bounds_of_priors
@@ -161,6 +162,10 @@ class Effect:
             Whether the momentum of the wheels is recorded.
         """
         return self
+
+    def shows_in(self, recordings: Sequence[Recording]) -> bool:
+        """Return whether recordings could show the effect, by default that they could."""
+        return True
 
     def at(self, instants: Sequence[float]) -> Self:
         """Return the effect with other instants."""
