@@ -20,9 +20,17 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     from bayesid.app.functions.check_study import check
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
+    from bayesid.app.study_to_conventions import convention_lines, remedy_sentence
+    from bayesid.recording.convention import ConventionError
     from bayesid.report import check_report
 
-    result = check(study)
+    try:
+        result = check(study)
+    except ConventionError as error:  # so wrong that nothing else can be said
+        conventions = [convention.to_dict() for convention in error.conventions]
+        with complete_folder(output) as folder:
+            write_json(folder / "check.json", {"title": study.title, "conventions": conventions})
+        raise
     posterior = result.posterior
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {counted(count, 'recording')}, {posterior.samples} samples, {posterior.size} unknowns."
@@ -31,6 +39,11 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     with complete_folder(output) as folder:
         write_json(folder / "check.json", result.to_dict())
         origin = report_origin(study, "check", None, output=output)
-        check_report(posterior, result.recordings, study.title, folder / "report.pdf", origin=origin)
+        said = convention_lines(result.conventions)
+        file = folder / "report.pdf"
+        check_report(posterior, result.recordings, study.title, file, conventions=said, origin=origin)
+    yield from said
+    if said:
+        yield remedy_sentence(study.file)
     yield from result.summary().sentences
     yield f"Wrote {output / 'report.pdf'}."

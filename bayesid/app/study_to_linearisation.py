@@ -17,6 +17,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.design.predicted_posterior import planned_posterior
 from bayesid.identifiability.hypothetical_experiment import blanked, has
 from bayesid.identifiability.practical_identifiability import Basis
+from bayesid.inference.conventions import refuse_conventions
 from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -70,6 +71,7 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
     manoeuvres = load_manoeuvres(study, model.robot)
     if lacking := lacking_sensors(model, manoeuvres):
         return _predicted(study, model, manoeuvres, lacking)
+    refuse_conventions(model, manoeuvres)
     posterior = Posterior.of(model, manoeuvres)
     refuse_wrong_units(posterior)
     return fitted_point(posterior, np.random.default_rng(seed))

@@ -13,12 +13,15 @@ from bayesid._io.errors import InputError
 from bayesid._io.store import file_key
 from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
 from bayesid.app.schema.sensor_sections import FilteredSensor
+from bayesid.app.study_to_conventions import recorded_as
 from bayesid.app.study_to_encoders import encoder_noise, named_joint
 from bayesid.app.user_files import run_user_file
 from bayesid.design.criteria import Criterion, named_criteria
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.inference.conventions import refuse_conventions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
+from bayesid.recording.convention import ConventionError
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
@@ -69,7 +72,12 @@ def load_posterior(study: Study, window: int | None = None) -> Posterior:
         If a file is absent or a rule is broken; the message names file, place, value and remedy.
     """
     model = load_model(study)
-    return Posterior.of(model, load_manoeuvres(study, model.robot), window=window)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    try:
+        refuse_conventions(model, manoeuvres)
+    except ConventionError as error:
+        raise error.within(file=study.file) from None
+    return Posterior.of(model, manoeuvres, window=window)
 
 
 def load_robot(study: Study) -> Robot:
@@ -226,7 +234,7 @@ def _check_latitudes(study: Study) -> None:
 
 def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
-    recording = unwrapped(Recording.read(section.file), robot)
+    recording = unwrapped(Recording.read(section.file, recorded_as(study, section, robot)), robot)
     check_wheels(recording, robot.wheels)
     refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
     for name in section.start:

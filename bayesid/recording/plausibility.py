@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.recording import Recording
-from bayesid.robot.robot import Robot
+from bayesid.recording.units import ANGLES, UNITS
+from bayesid.robot.robot import Joint, Robot
 
 __all__ = ["refuse_impossible_motion", "unwrapped"]
 
@@ -20,6 +23,7 @@ FASTEST_BASE = 20.0  # angular speed of the base that no free-flying robot keeps
 TURN = 2.0 * np.pi  # by which an angle jumps where its reading begins anew [rad]
 NEAR_TURN = 0.5  # difference from a turn by which a joint may move from one sample to the next beside the jump [rad]
 GARBLED = 0.01  # share of the samples up to which those outside the limits are garbled, not in another unit
+MOST_DEGREES = 1000.0  # largest angle that is taken for degrees where arcseconds would be within the limits too
 RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the base
 
 
@@ -45,7 +49,20 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
             if speed > FASTEST_BASE:
                 problem = f"half of the readings are beyond {speed:.3g} rad/s, which is over three turns a second"
                 remedy = "Give rates in rad/s, not in arcseconds or degrees per second"
-                raise InputError(problem, file=recording.file or recording.name, place=f"column {name}", remedy=remedy)
+                units = [u for u, f in UNITS["rate"].items() if f * speed < FASTEST_BASE and u in ("deg/s", "arcsec/s")]
+                conventions = [
+                    Convention(
+                        "convention:unit:rate",
+                        "rate",
+                        f'[sensors.rate]\nunit = "{unit}"',
+                        f"The readings of rate are in {unit}, not in rad/s.",
+                        1.0 / len(units),
+                    )
+                    for unit in units
+                ]
+                raise ConventionError(
+                    conventions, problem, file=recording.file or recording.name, place=f"column {name}", remedy=remedy
+                )
 
 
 def unwrapped(recording: Recording, robot: Robot) -> Recording:
@@ -88,6 +105,7 @@ def unwrapped(recording: Recording, robot: Robot) -> Recording:
 
 
 def _refuse_joints(recording: Recording, robot: Robot) -> None:
+    file = recording.file or recording.name
     for joint in robot.joints:
         name = f"position.{joint.name}"
         if name not in recording.channels:
@@ -95,22 +113,23 @@ def _refuse_joints(recording: Recording, robot: Robot) -> None:
         time, position = recording.series(name)
         slack = 0.1 * (joint.upper - joint.lower) if np.isfinite(joint.upper - joint.lower) else 0.0
         outside = (position < joint.lower - slack) | (position > joint.upper + slack)
-        remedy = (
+        other = (
             "Give positions in radians, not degrees"
             if joint.unit == "rad"
             else "Give positions in metres, not millimetres"
         )
-        file = recording.file or recording.name
         if outside.any():
             row, count = int(np.argmax(outside)), int(outside.sum())
-            if count <= GARBLED * len(outside):
-                remedy = f"{count} of {len(outside)} samples are garbled: empty their cells"
-            raise InputError(
+            garbled = count <= GARBLED * len(outside)
+            conventions = _fill(name, position[outside]) if garbled else _other_conventions(recording, robot, joint)
+            remedy = f"{count} of {len(outside)} samples are garbled: empty their cells" if garbled else other
+            raise ConventionError(
+                conventions,
                 f"{position[row]:g} {joint.unit} at time {time[row]:g} s is outside the joint's limits "
                 f"[{joint.lower:g}, {joint.upper:g}]",
                 file=file,
                 place=f"column {name}",
-                remedy=f"{remedy}, or correct the limits in the URDF",
+                remedy=f"{_or_stated(conventions)}{remedy}, or correct the limits in the URDF",
             )
         if fast := _impossible_speed(time, position, joint.velocity):
             raise InputError(
@@ -118,8 +137,60 @@ def _refuse_joints(recording: Recording, robot: Robot) -> None:
                 f"its limit is {joint.velocity:g}",
                 file=file,
                 place=f"column {name}",
-                remedy=f"{remedy}, or correct the limit in the URDF",
+                remedy=f"{other}, or correct the limit in the URDF",
             )
+
+
+def _or_stated(conventions: Sequence[Convention]) -> str:
+    return "".join(f"{convention} Or: " for convention in conventions)
+
+
+def _fill(name: str, outside: Floats) -> list[Convention]:
+    """Return the convention that samples outside the limits of a joint, all the same, are fill values."""
+    if len(set(outside.tolist())) > 1:
+        return []
+    line = f"[sensors.encoder]\nmissing = {outside[0]:.12g}"
+    text = f"{len(outside)} samples of {name} are filled with {outside[0]:g}."
+    return [Convention(f"convention:fill:{name}", name, line, text)]
+
+
+def _other_conventions(recording: Recording, robot: Robot, joint: Joint) -> list[Convention]:
+    """Return the conventions by which a joint that is outside its limits would be within them."""
+    quoted = f'[joints."{joint.name}"]'
+
+    def within(values: Floats, of: Joint = joint) -> bool:
+        return bool(of.lower - READING_ERROR <= values.min() and values.max() <= of.upper + READING_ERROR)
+
+    def seen(of: Joint) -> Floats:
+        return (
+            recording.series(f"position.{of.name}")[1] if f"position.{of.name}" in recording.channels else np.zeros(1)
+        )
+
+    position, conventions = seen(joint), []
+    text = f"Joint {joint.name} counts the other way than in the robot's file."
+    if within(-position):
+        conventions.append(Convention(f"convention:sign:{joint.name}", joint.name, f"{quoted}\nsign = -1", text))
+    for other in robot.joints:
+        if other.unit == joint.unit and other != joint and within(seen(other)) and within(position, other):
+            lines = (
+                f'{quoted}\ncolumn = "position.{other.name}"\n[joints."{other.name}"]\ncolumn = "position.{joint.name}"'
+            )
+            name = f"{joint.name},{other.name}"
+            text = f"The columns of joints {joint.name} and {other.name} are exchanged."
+            conventions.append(Convention(f"convention:exchanged:{name}", name, lines, text))
+    if joint.unit == "rad":
+        turns = [other for other in robot.joints if other.unit == "rad"]
+        units = [u for u, f in ANGLES.items() if f < 1.0 and all(within(f * seen(other), other) for other in turns)]
+        largest = max(float(np.abs(seen(other)).max()) for other in turns)
+        if "deg" in units and largest < MOST_DEGREES:
+            units = ["deg"]
+        for unit in units if largest > TURN else ():
+            line, text = f'[sensors.encoder]\nunit = "{unit}"', f"The joints are in {unit}, not in rad."
+            conventions.append(Convention("convention:unit:position", "position", line, text))
+    elif within(1e-3 * position):
+        text = f"Joint {joint.name} is in mm, not in m."
+        conventions.append(Convention(f"convention:unit:{joint.name}", joint.name, f"{quoted}\nscale = 0.001", text))
+    return [replace(convention, probability=1.0 / len(conventions)) for convention in conventions]
 
 
 def _impossible_speed(time: Floats, position: Floats, limit: float) -> tuple[float, float] | None:

@@ -22,6 +22,8 @@ from numpy.typing import ArrayLike
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
+from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.recorded_as import RecordedAs
 from bayesid.recording.time_column import calendar_seconds, refuse_other_units, typed_seconds
 
 __all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "WHEEL_SPEED", "Recording", "declare_family"]
@@ -77,8 +79,14 @@ class Recording:
         return Recording, (self.name, self.file, self.time, dict(self.channels))
 
     @classmethod
-    def read(cls, path: str | Path) -> Recording:
+    def read(cls, path: str | Path, recorded_as: RecordedAs | None = None) -> Recording:
         """Read and check a ``.csv`` or ``.parquet`` file.
+
+        Parameters
+        ----------
+        path : path
+        recorded_as : RecordedAs, optional
+            Conventions of the file that differ from the format.
 
         Raises
         ------
@@ -92,6 +100,8 @@ class Recording:
         if reader is None:
             raise InputError(f"a recording cannot be a {file.suffix!r} file", file=file, remedy=_FORMATS)
         columns = reader(file)
+        if recorded_as is not None:
+            columns = recorded_as.converted(columns)
         return cls(file.stem, file, columns.pop("time"), columns)
 
     def write(self, path: str | Path) -> None:
@@ -273,6 +283,11 @@ class Recording:
         off = np.abs(norm - 1.0) > NORM_TOLERANCE
         if off.any():
             row = int(np.argmax(off))
+            if len(set(sample := [float(channels[column][row]) for column in columns])) == 1:
+                line = f"[sensors.attitude]\nmissing = {sample[0]:g}"
+                text = f"Attitudes that are missing are filled with {sample[0]:g}."
+                convention = Convention("convention:fill:attitude", "attitude", line, text)
+                raise ConventionError([convention], file=self.file or self.name, place=f"column '{columns[0]}'")
             problem = f"the quaternion's norm is {norm[row]:.6g}, not 1"
             raise self._error(problem, columns=columns, row=row, remedy="Give unit quaternions in the order x, y, z, w")
         for column in columns:

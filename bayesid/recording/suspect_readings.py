@@ -13,6 +13,7 @@ from enum import Enum
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid.recording.convention import Convention
 from bayesid.recording.recording import VECTOR_FAMILIES, Recording
 
 __all__ = ["SuspectReadings", "Suspicion", "suspect_readings"]
@@ -21,6 +22,8 @@ FEWEST = 8  # number of runs of equal readings from which their lengths tell tha
 ALIKE = 0.9  # share of the runs that have one length where readings are held
 JUMP = 8.0  # jump into and out of readings that are filled in, relative to the largest step nearby
 NEARBY = 10  # number of steps before and after a run that are nearby
+STRAIGHT = 1e-4  # bend relative to the largest one below which readings lie on a straight line
+AGAIN = 3  # number of single samples, exactly equal and far from their neighbours, that are fill values
 LONGEST = 0.05  # share of the samples above which a run of equal readings is long
 
 
@@ -29,6 +32,7 @@ class Suspicion(Enum):
 
     FILLED = "filled in"
     HELD = "held"
+    INTERPOLATED = "interpolated"
     CONSTANT = "constant"
 
 
@@ -60,16 +64,33 @@ class SuspectReadings:
 
     def __str__(self) -> str:
         name = self.columns[0] if len(self.columns) == 1 else f"{self.columns[0]} to {self.columns[-1]}"
-        if self.kind is Suspicion.HELD:
+        if self.kind in (Suspicion.HELD, Suspicion.INTERPOLATED):
             return (
-                f"{name}: readings are held, a new one comes every {self.interval:.4g} s: leave the cells between "
-                "empty."
+                f"{name}: readings are {self.kind.value}, a new one comes every {self.interval:.4g} s: leave the cells "
+                "between empty."
             )
         shown = f"{self.value[0]:g}" if len(set(self.value)) == 1 else ", ".join(f"{value:g}" for value in self.value)
         where = f"{self.samples} samples from {self.start:.6g} to {self.end:.6g} s"
         if self.kind is Suspicion.FILLED:
             return f"{name}: {where} are exactly {shown}, far from the others: empty them if they are fill values."
         return f"{name}: {where} are exactly {shown}: was it off? Empty their cells or begin the recording later."
+
+    @property
+    def convention(self) -> Convention | None:
+        """The wrong convention that the readings show, None where they may be true."""
+        family = self.columns[0].partition(".")[0]
+        many = len(self.columns) > 1
+        section = "sensors.encoder" if family == "position" else f"sensors.{family}"
+        channel = self.columns[0] if family == "position" and not many else family
+        if self.kind in (Suspicion.HELD, Suspicion.INTERPOLATED):
+            name, line = f"convention:held:{channel}", f"native_rate = {1.0 / self.interval:.6g}"
+        elif self.kind is Suspicion.FILLED:
+            values = sorted(set(self.value))
+            shown = f"{values[0]:.12g}" if len(values) == 1 else f"[{', '.join(f'{value:.12g}' for value in values)}]"
+            name, line = f"convention:fill:{channel}", f"missing = {shown}"
+        else:
+            return None
+        return Convention(name, channel, f"[{section}]\n{line}", f"{self}")
 
 
 def suspect_readings(recording: Recording) -> list[SuspectReadings]:
@@ -105,7 +126,15 @@ def _of_columns(recording: Recording, columns: tuple[str, ...]) -> Iterator[Susp
         interval = float(np.median(np.diff(time[first])))
         yield SuspectReadings(Suspicion.HELD, columns, float(time[0]), float(time[-1]), len(time), interval)
         return
+    if (interval := _interpolated(time, values)) > 0.0:
+        yield SuspectReadings(Suspicion.INTERPOLATED, columns, float(time[0]), float(time[-1]), len(time), interval)
+        return
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
+    if (scattered := _scattered_fill(values, steps)) is not None:
+        rows, value = scattered
+        start, end = float(time[rows[0]]), float(time[rows[-1]])
+        yield SuspectReadings(Suspicion.FILLED, columns, start, end, len(rows), value=value)
+        return
     for row, length in zip(first, lengths, strict=True):
         jump = min(steps[place] if 0 <= place < len(steps) else 0.0 for place in (row - 1, row + length - 1))
         if length > 1 and jump > JUMP * _nearby(steps, row, length) > 0.0:
@@ -116,6 +145,32 @@ def _of_columns(recording: Recording, columns: tuple[str, ...]) -> Iterator[Susp
             continue
         start, end = float(time[row]), float(time[row + length - 1])
         yield SuspectReadings(kind, columns, start, end, int(length), value=tuple(values[row].tolist()))
+
+
+def _interpolated(time: Floats, values: Floats) -> float:
+    """Return the interval of readings between which straight lines are drawn, 0 where there are none [s]."""
+    slopes = np.diff(values, axis=0) / np.diff(time)[:, None]
+    bends = np.abs(np.diff(slopes, axis=0)).max(axis=1)
+    kinks = np.flatnonzero(bends > STRAIGHT * bends.max())
+    apart = np.diff(kinks)
+    if len(apart) < FEWEST or np.median(apart) < 2 or np.mean(apart == np.median(apart)) < ALIKE:
+        return 0.0
+    return float(np.median(np.diff(time[kinks + 1])))
+
+
+def _scattered_fill(values: Floats, steps: Floats) -> tuple[Integers, tuple[float, ...]] | None:
+    """Return the rows of one sample that comes again and again, far from its neighbours, and that sample."""
+    jumps = np.minimum(steps[1:], steps[:-1])
+    typical = float(np.median(steps))
+    far = 1 + np.flatnonzero(jumps > JUMP * max(typical, 1e-12))
+    if len(far) < AGAIN:
+        return None
+    samples, counts = np.unique(values[far], axis=0, return_counts=True)
+    most = int(np.argmax(counts))
+    if counts[most] < AGAIN or typical == 0.0:
+        return None
+    rows = np.flatnonzero((values == samples[most]).all(axis=1))
+    return rows, tuple(samples[most].tolist())
 
 
 def _nearby(steps: Floats, row: int, length: int) -> float:

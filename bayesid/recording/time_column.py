@@ -15,11 +15,12 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.convention import Convention, ConventionError
 
 __all__ = ["calendar_seconds", "refuse_other_units", "typed_seconds"]
 
 SLOWEST = 30.0  # median time between rows above which no motion of a robot is followed [s]
-UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
+UNITS = {"milliseconds": ("ms", 1e3), "microseconds": ("us", 1e6), "nanoseconds": ("ns", 1e9)}
 EPOCH = 5e8, 5e9  # range of the seconds since 1970 from 1985 to 2128 [s]
 
 
@@ -76,24 +77,34 @@ def refuse_other_units(time: Floats, file: Path | str) -> None:
         If they are counts since 1970, or their rows so far apart that they must be in a smaller unit.
     """
     first, interval = float(time[0]), float(np.median(np.diff(time)))
-    for name, scale in {"seconds": 1.0, **UNITS}.items():
+    for name, (unit, scale) in {"seconds": ("s", 1.0), **UNITS}.items():
         if EPOCH[0] <= first / scale <= EPOCH[1]:
-            raise InputError(
+            raise _in_unit(
                 f"the first time, {first:.15g}, is a count of {name} since 1970",
-                file=file,
-                place="column 'time'",
-                remedy="Give seconds from the start of the recording: subtract the first time"
+                "Give seconds from the start of the recording: subtract the first time"
                 + (f" and divide by {scale:g}" if scale > 1.0 else ""),
+                file,
+                unit,
             )
     if interval <= SLOWEST:
         return
-    name, scale = next(
-        ((name, scale) for name, scale in UNITS.items() if interval / scale < SLOWEST), ("another unit", 1.0)
+    name, (unit, scale) = next(
+        ((name, scale) for name, scale in UNITS.items() if interval / scale[1] < SLOWEST), ("another unit", ("", 1.0))
     )
-    raise InputError(
+    raise _in_unit(
         f"the rows are {interval:g} s apart in the median, too far to follow a motion; in {name} they would be "
         f"{interval / scale:g} s apart",
-        file=file,
-        place="column 'time'",
-        remedy=f"Give seconds: divide the times by {scale:g}" if scale > 1.0 else "Give seconds",
+        f"Give seconds: divide the times by {scale:g}" if scale > 1.0 else "Give seconds",
+        file,
+        unit,
     )
+
+
+def _in_unit(problem: str, remedy: str, file: Path | str, unit: str) -> InputError:
+    place = "column 'time'"
+    if not unit:
+        return InputError(problem, file=file, place=place, remedy=remedy)
+    line = f'[telemetry]\ntime_unit = "{unit}"'
+    convention = Convention("convention:unit:time", "time", line, f"{problem[0].upper()}{problem[1:]}.")
+    stated = f"{remedy}, or state it: {'; '.join(line.splitlines())}"
+    return ConventionError([convention], problem, file=file, place=place, remedy=stated)

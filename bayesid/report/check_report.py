@@ -19,7 +19,13 @@ __all__ = ["check_report"]
 
 
 def check_report(
-    posterior: Posterior, checks: Sequence[RecordingCheck], title: str, file: Path, *, origin: str = ""
+    posterior: Posterior,
+    checks: Sequence[RecordingCheck],
+    title: str,
+    file: Path,
+    *,
+    conventions: Sequence[str] = (),
+    origin: str = "",
 ) -> None:
     """Write the report of a check as PDF, whole or not at all.
 
@@ -31,6 +37,8 @@ def check_report(
     title : str
         Title of the study.
     file : path
+    conventions : sequence of str, optional
+        Sentences on wrong conventions.
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
@@ -42,7 +50,7 @@ def check_report(
         f"{counted(posterior.size, 'unknown')}. The integration step is {posterior.step:g} s. Nothing was identified: "
         "simulated values are those of the robot as given."
     )
-    remarks = [f"{check.name}: {warning}" for check in checks for warning in check.warnings]
+    remarks = [*conventions, *(f"{check.name}: {warning}" for check in checks for warning in check.warnings)]
     document.items(remarks or ["Nothing conspicuous."])
     robot = posterior.model.robot
     time = posterior.manoeuvres[0].recording.time

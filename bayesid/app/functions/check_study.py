@@ -6,9 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from bayesid._io.short_form import ShortForm, Summary
-from bayesid.app.functions.study_source import StudySource, recorded_posterior, study_of
+from bayesid.app.functions.study_source import StudySource, study_of
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.inference.conventions import find_conventions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import RecordingCheck, check_recording
+from bayesid.inference.wrong_units import refuse_wrong_units
+from bayesid.recording.convention import Convention
 
 __all__ = ["StudyCheck", "check"]
 
@@ -25,17 +29,21 @@ class StudyCheck(ShortForm):
         Posterior of the recordings, without the correlation of the encoders' noise.
     recordings : tuple of RecordingCheck
         Sampling, noise and likely mistakes of each recording.
+    conventions : tuple of Convention
+        What the recordings take otherwise than declared.
     """
 
     title: str
     posterior: Posterior
     recordings: tuple[RecordingCheck, ...]
+    conventions: tuple[Convention, ...] = ()
 
     def summary(self) -> Summary:
         """Return what is conspicuous, a sentence for each recording."""
+        quiet = "See the conventions." if self.conventions else "Nothing conspicuous."
         return Summary(
             [
-                f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
+                f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or quiet)
                 for check in self.recordings
             ]
         )
@@ -46,6 +54,7 @@ class StudyCheck(ShortForm):
             "title": self.title,
             "robot": {"remarks": self.posterior.model.robot.remarks},
             "recordings": [_check_dict(check) for check in self.recordings],
+            "conventions": [convention.to_dict() for convention in self.conventions],
         }
 
 
@@ -62,9 +71,18 @@ def check(study: StudySource | Posterior) -> StudyCheck:
         If a file is absent, a rule is broken or numbers cannot be in the units of the format.
     """
     study = study if isinstance(study, Posterior) else study_of(study)
-    posterior = recorded_posterior(study, window=0)  # nothing is fitted: the samples' correlations do not matter
+    if isinstance(study, Posterior):
+        posterior, conventions = study, find_conventions(study.model, study.manoeuvres)
+    else:
+        model = load_model(study)
+        manoeuvres = load_manoeuvres(study, model.robot)
+        conventions = find_conventions(model, manoeuvres)
+        # nothing is fitted: the samples' correlations do not matter
+        posterior = Posterior.of(model, manoeuvres, window=0)
+        if not conventions:
+            refuse_wrong_units(posterior)
     checks = tuple(check_recording(posterior, index) for index in range(len(posterior.manoeuvres)))
-    return StudyCheck("" if isinstance(study, Posterior) else study.title, posterior, checks)
+    return StudyCheck("" if isinstance(study, Posterior) else study.title, posterior, checks, tuple(conventions))
 
 
 def _check_dict(check: RecordingCheck) -> dict[str, Any]:

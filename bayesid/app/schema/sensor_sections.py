@@ -13,12 +13,15 @@ from bayesid.app.schema.value_types import (
     ANGLE_SIGMA,
     Decimation,
     Name,
+    NonNegative,
+    Numbers,
     PerAxis,
     PerName,
     Position,
     Positive,
     Quaternion,
     Section,
+    Vector,
     no_less_than,
     no_more_than,
 )
@@ -30,7 +33,25 @@ if TYPE_CHECKING:
 Arcseconds = Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")]
 
 
-class FilteredSensor(Section):
+class SampledSensor(Section):
+    """Keys on how the readings of a sensor were recorded, as far as that differs from the format.
+
+    Parameters
+    ----------
+    missing : float or list of float, optional
+        Values that stand for missing readings.
+    native_rate : float, optional
+        Rate at which new readings come, where they are held or interpolated between [Hz].
+    latency : float, optional
+        Time by which the stamps of the readings are late [s].
+    """
+
+    missing: Numbers = ()
+    native_rate: Positive | None = None
+    latency: NonNegative = 0.0
+
+
+class FilteredSensor(SampledSensor):
     """Keys of every sensor of the base.
 
     Parameters
@@ -63,9 +84,12 @@ class MountedSensor(FilteredSensor):
     ----------
     mounting : (4,), optional
         Quaternion from sensor to base axes.
+    reflected : bool, optional
+        Whether the axes of the readings are left-handed: all readings are counted the other way before mounting.
     """
 
     mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    reflected: bool = False
 
 
 class RateSensor(MountedSensor):
@@ -85,6 +109,8 @@ class RateSensor(MountedSensor):
         enter, the noise is sqrt(2) times the angle divided by the sample interval.
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [rad/s]; by default the model has no bias.
+    unit : str, optional
+        Unit of the readings, such as "deg/s", by default "rad/s"; noise and bias are in rad/s whatever it is.
     """
 
     NOISE = ("sigma", "angle_random_walk", "attitude_arcsec")
@@ -95,6 +121,7 @@ class RateSensor(MountedSensor):
     ) = None
     attitude_arcsec: Arcseconds | None = None
     bias_sigma: PerAxis | None = None
+    unit: Literal["rad/s", "deg/s", "mrad/s", "arcsec/s", "rev/s", "deg/h", "rpm"] = "rad/s"
 
     @property
     def noise(self) -> Noise:
@@ -124,6 +151,12 @@ class AccelSensor(MountedSensor):
         Position from the base origin, base axes [m].
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [m/s2]; by default the model has no bias.
+    unit : str, optional
+        Unit of the readings, such as "g", by default "m/s2"; noise and bias are in m/s2 whatever it is.
+    gravity : (3,), optional
+        Gravity in the readings, as on the ground: sensor axes, at their first instant [m/s2].
+    gravity_fixed_in : {"sensor", "space"}, optional
+        Whether it stays constant in the axes of the sensor or in space, by default in those of the sensor.
     """
 
     NOISE = ("sigma", "noise_density")
@@ -135,6 +168,9 @@ class AccelSensor(MountedSensor):
     ) = None
     position: Position
     bias_sigma: PerAxis | None = None
+    unit: Literal["m/s2", "g", "mg", "ug", "mm/s2", "cm/s2"] = "m/s2"
+    gravity: Vector | None = None
+    gravity_fixed_in: Literal["sensor", "space"] = "sensor"
 
     @property
     def noise(self) -> Noise:
@@ -155,12 +191,22 @@ class AttitudeSensor(FilteredSensor):
         Standard deviation of white noise per sample, as a small rotation in base axes [rad].
     arcsec : float
         Standard deviation of white noise per sample [arcsec].
+    order : {"xyzw", "wxyz"}, optional
+        Order of the components of the readings.
+    inverse : bool, optional
+        Whether they are quaternions from orbit to base axes.
+    frame : {"orbit", "inertial", "rotating"}, optional
+        Axes to which they are relative: those of the orbit at time 0; other fixed axes, so that only their change from
+        the recording's attitude counts; or axes that turn with the orbit.
     """
 
     NOISE = ("sigma", "arcsec")
 
     sigma: Annotated[PerAxis, ANGLE_SIGMA] | None = None
     arcsec: Arcseconds | None = None
+    order: Literal["xyzw", "wxyz"] = "xyzw"
+    inverse: bool = False
+    frame: Literal["orbit", "inertial", "rotating"] = "orbit"
 
     @property
     def noise(self) -> Noise:
@@ -170,7 +216,7 @@ class AttitudeSensor(FilteredSensor):
         return White(self.sigma if self.sigma is not None else (self.arcsec or math.nan) * ARCSEC)
 
 
-class EncoderSensor(Section):
+class EncoderSensor(SampledSensor):
     """Section ``[sensors.encoder]``, the measurements of the joints.
 
     Parameters
@@ -178,11 +224,14 @@ class EncoderSensor(Section):
     sigma, velocity_sigma, acceleration_sigma : float or table of joint to float, optional
         Standard deviations of white noise per sample of position [rad, or m for prismatic joints], velocity and
         acceleration, by default estimated from the data.
+    unit : str, optional
+        Unit of the angles in the readings, such as "deg", by default "rad"; noise is in rad whatever it is.
     """
 
     sigma: Annotated[PerName, ANGLE_SIGMA] | None = None
     velocity_sigma: Annotated[PerName, no_more_than(1.0, "rad/s, not degrees/s?")] | None = None
     acceleration_sigma: PerName | None = None
+    unit: Literal["rad", "deg", "mrad", "arcsec", "rev"] = "rad"
 
     def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
         """Return the noise per sample of one joint's position, velocity or acceleration, None if not given.

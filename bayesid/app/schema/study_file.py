@@ -21,8 +21,9 @@ from bayesid.app.schema.study_sections import (
     UnknownsSection,
     check_extended,
 )
+from bayesid.app.schema.telemetry_section import JointSection, TelemetrySection
 from bayesid.app.schema.validation_messages import explain, syntax_error
-from bayesid.app.schema.value_types import Section, array_of_tables
+from bayesid.app.schema.value_types import Name, Section, array_of_tables
 
 
 class Study(Section):
@@ -38,6 +39,10 @@ class Study(Section):
         Orbit about the Earth; None away from it, where no environment effect applies.
     sensors : SensorsSection
         Sensors and their noise.
+    telemetry : TelemetrySection, optional
+        Times of the recordings.
+    joints : table of JointSection
+        Joints that were recorded otherwise than the robot's file has them, by their names.
     recordings : sequence of RecordingSection
         Recordings; commands that only design need none.
     unknowns : UnknownsSection
@@ -54,6 +59,8 @@ class Study(Section):
     robot: RobotSection
     orbit: OrbitSection | None = None
     sensors: SensorsSection
+    telemetry: TelemetrySection = TelemetrySection()
+    joints: Mapping[Name, JointSection] = {}
     recordings: Annotated[tuple[RecordingSection, ...], BeforeValidator(array_of_tables)] = ()
     unknowns: UnknownsSection
     model: ModelSection = ModelSection()

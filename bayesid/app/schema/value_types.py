@@ -157,6 +157,15 @@ PerComponent = Annotated[
     Discriminator(lambda value: "list" if isinstance(value, (list, tuple)) else "number"),
 ]
 
+
+def _several(value: Any) -> Any:
+    """Return one number as a tuple of it."""
+    return (value,) if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+# one number or a list of them
+Numbers = Annotated[tuple[Number, ...], BeforeValidator(_several, json_schema_input_type=Number | list[Number])]
+
 # validator of angles, which are at most one turn [rad]
 FULL_TURN = no_more_than(2.0 * math.pi, "Radians, not degrees?")
 # validator of the noise of angles, which no sensor exceeds [rad]

@@ -1,0 +1,55 @@
+"""Sections of a study file on how its telemetry was recorded, as far as that differs from the format."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from bayesid._io.errors import InputError
+from bayesid.app.schema.value_types import FULL_TURN, Name, Number, Positive, Section
+
+__all__ = ["JointSection", "TelemetrySection"]
+
+
+class JointSection(Section):
+    """Section ``[joints.JOINT]``, a joint that was recorded otherwise than the robot's file has it.
+
+    Its position is ``sign * scale * reading + offset``.
+
+    Parameters
+    ----------
+    sign : {1, -1}, optional
+        -1 for a joint that counts the other way.
+    offset : float, optional
+        What is added to its position [rad or m].
+    scale : float, optional
+        Factor of its position, velocity and acceleration, such as 0.001 for millimetres.
+    column : str, optional
+        Column ``position.OTHER`` that holds its position; its other readings are then in those of OTHER too.
+    """
+
+    sign: Annotated[int, Field(ge=-1, le=1)] = 1
+    offset: Annotated[Number, FULL_TURN] = 0.0
+    scale: Positive = 1.0
+    column: Name | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> JointSection:
+        if self.sign == 0:
+            raise InputError("got 0", place="sign", remedy="Give 1 or -1")
+        if self.column is not None and not self.column.startswith("position."):
+            raise InputError(f"got '{self.column}'", place="column", remedy='Give a column "position.JOINT"')
+        return self
+
+
+class TelemetrySection(Section):
+    """Section ``[telemetry]``, the times of all recordings.
+
+    Parameters
+    ----------
+    time_unit : {"s", "ms", "us", "ns", "min"}, optional
+        Unit of the times; with it, times counted from long before the recording, as since 1970, count from its start.
+    """
+
+    time_unit: Literal["s", "ms", "us", "ns", "min"] | None = None

@@ -1,0 +1,241 @@
+"""Search of the mistakes that explain what readings as declared do not, one after the other, and their probabilities.
+
+Sets of mistakes are weighed by their evidence under the balance of momentum and by the prior of their families (sets
+grow from the best ones, as in a beam search). Nothing is named unless it explains several times more than the readings
+as declared: an effect that no mistake explains favours none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import log_sum
+from bayesid.inference.conventions.joint_counting import zero_of
+from bayesid.inference.conventions.mistake import Mistake, families
+from bayesid.inference.conventions.momentum_balance import BalanceFit, BalanceProblem, MomentumBalance
+from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
+from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.recorded_as import RecordedAs, SensorRecordedAs
+from bayesid.recording.recording import Recording
+from bayesid.recording.suspect_readings import suspect_readings
+from bayesid.simulation.model import Manoeuvre, Model
+
+__all__ = ["find_conventions", "refuse_conventions"]
+
+BELIEVED = 0.95  # probability that the named mistakes, or their equals, must hold together
+MENTIONED = 0.04  # smallest probability of a mistake that is named beside its equals
+GAIN = 6.0  # factor by which the mean square of what is unexplained must fall in a sensor
+FEWEST_NATS = 5.0  # gain of log probability for which one more mistake is worth trying
+BEAM = 2  # number of sets from which larger ones are made
+DEEPEST = 3  # largest number of mistakes at once
+COARSE, FINE = 2, 10  # iterations of the fit that selects members, and of that which weighs them
+KEPT = 8  # number of members that are weighed
+INSTANTS = 40  # number of instants by which members are selected
+RECORDINGS = 3  # number of recordings that are looked at, as a mistake is in all of them
+ZERO_STEPS = np.deg2rad([15.0, 5.0, 1.5, 0.5])  # refinement of a joint's zero
+
+
+@dataclass(frozen=True)
+class _MistakeSet:
+    """Mistakes at once, and the fits of all recordings without them."""
+
+    mistakes: tuple[Mistake, ...]
+    fits: tuple[BalanceFit, ...]
+    log_prior: float
+
+    @property
+    def log_weight(self) -> float:
+        return self.log_prior + sum(fit.log_evidence for fit in self.fits)
+
+    def hope(self, parts: Sequence[str] = ()) -> float:
+        """Return the log evidence that a perfect explanation of some parts of the balance, or of all, would gain."""
+        return float(sum(gain for fit in self.fits for name, gain in fit.gains.items() if not parts or name in parts))
+
+    @property
+    def key(self) -> frozenset[str]:
+        return frozenset(f"{mistake.name} {mistake.channel} {id(mistake)}" for mistake in self.mistakes)
+
+
+class _Search:
+    def __init__(self, model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
+        known = {prior.name for prior in model.bodies}
+        spreads = [prior.spread for prior in model.priors if prior.name not in known]
+        self.balance = MomentumBalance(model.robot, model.bodies, model.rate_sigma, max(spreads, default=0.0))
+        self.recorded = [ReadingsOnGrid.of(model, manoeuvre) for manoeuvre in manoeuvres[:RECORDINGS]]
+        self.few = [max(self.recorded, key=_motion).thinned(INSTANTS)]
+        self.model = model
+        self._problems: dict[tuple[int, bytes], BalanceProblem] = {}
+
+    @cached_property
+    def members(self) -> list[tuple[Mistake, float]]:
+        """Members of all families, each with the logarithm of its prior."""
+        return [
+            (mistake, float(np.log(family.prior * mistake.share)))
+            for family in families()
+            for mistake in family.members(self.model, self.recorded[0])
+        ]
+
+    def weigh(self, mistakes: Sequence[Mistake], log_prior: float, coarsely: bool = False) -> _MistakeSet:
+        """Return a set with its fits.
+
+        Parameters
+        ----------
+        mistakes : sequence of Mistake
+        log_prior : float
+        coarsely : bool
+            Whether a few iterations at a few instants of one recording do.
+        """
+        ordered = tuple(sorted(mistakes, key=lambda mistake: mistake.rank))
+        fits = []
+        for recorded in self.few if coarsely else self.recorded:
+            readings = recorded
+            for mistake in ordered:
+                readings = mistake.undo(readings)
+            fits.append(self._problem(readings).fit(COARSE if coarsely else FINE))
+        return _MistakeSet(ordered, tuple(fits), log_prior)
+
+    def _problem(self, readings: ReadingsOnGrid) -> BalanceProblem:
+        """Return the problem, with the tables of others in which the joints move the same."""
+        key = readings.joints.position.tobytes()
+        if key not in self._problems:
+            self._problems[key] = self.balance.problem(readings)
+        return replace(self._problems[key], readings=readings)
+
+    def run(self) -> tuple[_MistakeSet, list[_MistakeSet]]:
+        """Return the readings as declared, and all sets that were weighed."""
+        declared = self.weigh((), 0.0)
+        weighed = {declared.key: declared}
+        beam = [declared]
+        for _ in range(DEEPEST):
+            grown: dict[frozenset[str], _MistakeSet] = {}
+            for parent in beam:
+                for considered in self._selected(parent):
+                    fine = self._refined(self.weigh(considered.mistakes, considered.log_prior))
+                    if fine.log_weight > parent.log_weight + FEWEST_NATS:
+                        grown[fine.key] = fine
+            weighed |= grown
+            beam = sorted(grown.values(), key=lambda considered: -considered.log_weight)[:BEAM]
+            if not beam or beam[0].hope() < FEWEST_NATS:
+                break
+        return declared, list(weighed.values())
+
+    def _selected(self, parent: _MistakeSet) -> list[_MistakeSet]:
+        """Return the most promising sets with one more mistake."""
+        places = {mistake.place for mistake in parent.mistakes}
+        sets = [
+            self.weigh((*parent.mistakes, mistake), parent.log_prior + prior, coarsely=True)
+            for mistake, prior in self.members
+            if mistake.place not in places and parent.hope(mistake.seen_by) - FEWEST_NATS > -prior
+        ]
+        return sorted(sets, key=lambda considered: -considered.log_weight)[:KEPT]
+
+    def _refined(self, considered: _MistakeSet) -> _MistakeSet:
+        """Return the set with the zeros of joints refined."""
+        for step in ZERO_STEPS:
+            for sign in (1.0, -1.0):
+                for place, mistake in enumerate(considered.mistakes):
+                    if mistake.offset is None:
+                        continue
+                    moved = zero_of(*mistake.offset[:2], mistake.offset[2] + sign * step, mistake.share)
+                    mistakes = (*considered.mistakes[:place], moved, *considered.mistakes[place + 1 :])
+                    other = self.weigh(mistakes, considered.log_prior)
+                    if other.log_weight > considered.log_weight:
+                        considered = other
+        return considered
+
+
+def _motion(readings: ReadingsOnGrid) -> float:
+    return float(np.ptp(readings.joints.position, axis=0).sum())
+
+
+def find_conventions(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Convention]:
+    """Return the wrong conventions of recordings, the most probable first; none where they are as declared.
+
+    Readings that no sensor gives are looked for first, and left out of the balance of momentum.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    """
+    suspects = [suspect for manoeuvre in manoeuvres for suspect in suspect_readings(manoeuvre.recording)]
+    repeated = {convention.remedy: convention for suspect in suspects if (convention := suspect.convention)}
+    conventions = list(repeated.values())
+    used = {"position", *(sensor.kind.value for sensor in model.sensors)}
+    conventions = [convention for convention in conventions if convention.name.split(":")[2].partition(".")[0] in used]
+    if any(suspect.convention and suspect.columns[0].startswith("position") for suspect in suspects):
+        return conventions  # motion that is smoothed through such readings says nothing
+    with np.errstate(all="ignore"):
+        try:
+            return conventions + _by_balance(model, [_without(manoeuvre, conventions) for manoeuvre in manoeuvres])
+        except (InputError, np.linalg.LinAlgError):  # a sensor is not recorded, or nothing moves
+            return conventions
+
+
+def refuse_conventions(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
+    """Refuse recordings with wrong conventions.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+
+    Raises
+    ------
+    ConventionError
+    """
+    if conventions := find_conventions(model, manoeuvres):
+        remedy = "State that in the study; `bayesid init --fix STUDY.toml` writes it"
+        raise ConventionError(conventions, remedy=remedy)
+
+
+def _without(manoeuvre: Manoeuvre, conventions: Sequence[Convention]) -> Manoeuvre:
+    """Return a recording without the readings that no sensor gives."""
+    if not conventions:
+        return manoeuvre
+    recording, sensors = manoeuvre.recording, {}
+    for suspect in suspect_readings(recording):
+        if suspect.convention is not None:
+            rate = 1.0 / suspect.interval if suspect.interval else 0.0
+            sensors[suspect.columns[0].partition(".")[0]] = SensorRecordedAs(suspect.value, rate)
+    channels = RecordedAs(sensors=sensors).converted({"time": recording.time, **recording.channels})
+    time = channels.pop("time")
+    return replace(manoeuvre, recording=Recording(recording.name, recording.file, time, channels))
+
+
+def _by_balance(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Convention]:
+    search = _Search(model, manoeuvres)
+    if not search.recorded[0].sensors and not len(search.recorded[0].attitude_time):
+        return []
+    declared, weighed = search.run()
+    if len(weighed) == 1:
+        return []
+    total = log_sum([considered.log_weight for considered in weighed])
+    best = max(weighed, key=lambda considered: considered.log_weight)
+    explained = [
+        before.misfit[name] / after.misfit[name]
+        for before, after in zip(declared.fits, best.fits, strict=True)
+        for name in before.misfit
+    ]
+    if np.exp(declared.log_weight - total) > 1.0 - BELIEVED or max(explained, default=0.0) < GAIN:
+        return []
+    conventions: dict[tuple[str, str], Convention] = {}
+    for considered in sorted(weighed, key=lambda considered: -considered.log_weight):
+        probability = float(np.exp(considered.log_weight - total))
+        if probability < MENTIONED:
+            continue
+        readings = search.recorded[0]
+        for mistake in considered.mistakes:
+            remedy = mistake.remedy(readings)
+            before = conventions.get((mistake.name, remedy))
+            sum_ = probability + (0.0 if before is None else before.probability)
+            conventions[mistake.name, remedy] = Convention(
+                mistake.name, mistake.channel, remedy, mistake.text(readings), sum_
+            )
+            readings = mistake.undo(readings)
+    return list(conventions.values())

@@ -1,0 +1,86 @@
+"""Joints that count the other way, or from another zero."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.conventions.mistake import Mistake, MistakeFamily
+from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
+from bayesid.robot.joint_state import JointState
+from bayesid.simulation.model import Model
+
+__all__ = ["JointSign", "JointZero"]
+
+MOVES = 1e-2  # range of a joint's motion from which its sign can matter [rad or m]
+ZEROS = np.deg2rad([-150.0, -120.0, -90.0, -60.0, -45.0, -30.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0])
+
+
+@MistakeFamily.register
+class JointSign(MistakeFamily):
+    """A joint whose angle counts the other way."""
+
+    def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
+        """Yield each joint that moves."""
+        for index, joint in enumerate(model.robot.joints):
+            if np.ptp(readings.joints.position[:, index]) > MOVES:
+                yield Mistake(
+                    f"convention:sign:{joint.name}",
+                    joint.name,
+                    f"sign:{joint.name}",
+                    2,
+                    lambda seen, index=index: _counted(seen, index, -1.0, 0.0),
+                    lambda seen, name=joint.name: f'[joints."{name}"]\nsign = -1',
+                    lambda seen, name=joint.name: f"Joint {name} counts the other way than in the robot's file.",
+                    1.0 / len(model.robot.joints),
+                )
+
+
+@MistakeFamily.register
+class JointZero(MistakeFamily):
+    """A revolute joint whose angle counts from another zero."""
+
+    def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
+        """Yield usual zeros of every revolute joint; the search refines them (`refined`)."""
+        for index, joint in enumerate(model.robot.joints):
+            for offset in ZEROS if joint.unit == "rad" else ():
+                yield zero_of(index, joint.name, float(offset), 1.0 / len(ZEROS) / len(model.robot.joints))
+
+
+def zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
+    """Return the mistake that a joint's angle lacks an offset.
+
+    Parameters
+    ----------
+    index : int
+        Joint in the order of the robot.
+    name : str
+    offset : float
+        What is to be added [rad].
+    share : float
+        Share of the family's prior.
+    """
+    offset = float(np.pi - (np.pi - offset) % (2.0 * np.pi))  # within half a turn
+    return Mistake(
+        f"convention:zero:{name}",
+        name,
+        f"zero:{name}",
+        3,
+        lambda seen: _counted(seen, index, 1.0, offset),
+        lambda seen: f'[joints."{name}"]\noffset = {offset:.6g}',
+        lambda seen: f"Joint {name} counts from another zero: add {np.rad2deg(offset):.3g} degrees to its angle.",
+        share,
+        offset=(index, name, offset),
+    )
+
+
+def _counted(readings: ReadingsOnGrid, index: int, sign: float, offset: float) -> ReadingsOnGrid:
+    parts: list[Floats] = []
+    for order, values in enumerate(readings.joints):
+        changed = np.array(values)
+        changed[:, index] = sign * changed[:, index] + (offset if order == 0 else 0.0)
+        parts.append(changed)
+    return replace(readings, joints=JointState(*parts))

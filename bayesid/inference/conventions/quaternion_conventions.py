@@ -1,0 +1,106 @@
+"""Attitudes with the scalar first, inverse, or relative to other axes than those of the orbit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.conventions.mistake import Mistake, MistakeFamily
+from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
+from bayesid.recording.recorded_as import in_axes_of_orbit
+from bayesid.simulation.model import Model
+
+__all__ = ["QuaternionConventions", "StatedAttitude", "conjugate", "scalar_last"]
+
+
+def scalar_last(quaternions: Floats) -> Floats:
+    """Return quaternions w, x, y, z (..., 4) in the order x, y, z, w."""
+    return quaternions[..., [1, 2, 3, 0]]
+
+
+def conjugate(quaternions: Floats) -> Floats:
+    """Return the inverse of unit quaternions x, y, z, w (..., 4)."""
+    return quaternions * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+ORDER, INVERSE = 'order = "wxyz"', "inverse = true"
+FIRST = "Attitudes have the scalar first, w, x, y, z"
+OTHER_WAY = "Attitudes are inverse, from orbit to base axes"
+
+READINGS = ("attitude", "turning", "start")  # parts of the balance that hold them
+RANK = {"order": 0, "conjugate": 1}
+READ: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
+    ("order", ORDER, FIRST, scalar_last),
+    ("conjugate", INVERSE, OTHER_WAY, conjugate),
+)
+
+
+@MistakeFamily.register
+class QuaternionConventions(MistakeFamily):
+    """Readings of the star sensor."""
+
+    def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
+        """Yield order, inverse, and the axes to which they refer."""
+        if not len(readings.attitude_time):
+            return
+        for name, line, text, change in READ:
+            yield Mistake(
+                f"convention:{name}:attitude",
+                "attitude",
+                f"attitude:{name}",
+                RANK[name],
+                lambda seen, change=change: replace(seen, attitude=change(seen.attitude)),
+                lambda seen, line=line: f"[sensors.attitude]\n{line}",
+                lambda seen, text=text: f"{text}.",
+                0.3,
+                READINGS,
+            )
+        frames = {"inertial": "fixed axes other than those of the orbit at time 0"}
+        if readings.orbit_rate:
+            frames["rotating"] = "axes that turn with the orbit"
+        for frame, words in frames.items():
+            yield Mistake(
+                "convention:frame:attitude",
+                "attitude",
+                "attitude:frame",
+                2,
+                lambda seen, frame=frame: _in_orbit_axes(seen, frame),
+                lambda seen, frame=frame: f'[sensors.attitude]\nframe = "{frame}"',
+                lambda seen, words=words: f"Attitudes are relative to {words}.",
+                0.2,
+                READINGS,
+            )
+
+
+def _in_orbit_axes(readings: ReadingsOnGrid, frame: str) -> ReadingsOnGrid:
+    seen = readings.attitude_time, readings.attitude
+    return replace(readings, attitude=in_axes_of_orbit(*seen, frame, readings.start, readings.orbit_rate))
+
+
+@MistakeFamily.register
+class StatedAttitude(MistakeFamily):
+    """The attitude at time 0 that the study states, beside readings of a star sensor."""
+
+    def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
+        """Yield order and inverse."""
+        if not len(readings.attitude_time):
+            return
+        for name, _, text, change in READ:
+            yield Mistake(
+                f"convention:{name}:attitude",
+                "recordings.attitude",
+                f"stated:{name}",
+                RANK[name],
+                lambda seen, change=change: replace(seen, start=change(seen.start)),
+                lambda seen, change=change: _stated(change(seen.start)),
+                lambda seen, text=text: f"The attitude that the study states: {text[0].lower()}{text[1:]}.",
+                0.5,
+                ("start",),
+            )
+
+
+def _stated(quaternion: Floats) -> str:
+    return f"[[recordings]]\nattitude = [{', '.join(f'{value:.12g}' for value in quaternion)}]"

@@ -1,0 +1,226 @@
+"""Readings of one recording on a coarse even grid, as the balance of momentum compares them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from bayesid._math.arrays import Floats
+from bayesid.recording.actions import Actions
+from bayesid.robot.joint_state import JointState
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import SensorKind
+
+__all__ = ["GridSensor", "ReadingsOnGrid"]
+
+MOST = 160  # number of instants, enough for the motion of a manoeuvre
+SPREAD = 2.0  # intervals of the grid from the nearest sample beyond which an instant has no reading
+
+
+@dataclass(frozen=True)
+class GridSensor:
+    """Readings of a sensor whose reading is a vector.
+
+    Attributes
+    ----------
+    values : (n, 3) array
+        Averages of its readings about the instants, sensor axes.
+    present : (n,) array of bool
+        Instants near which there are samples.
+    sigma : float
+        Declared noise of these averages.
+    axes : (3, 3) array
+        Rotation from sensor to base axes as declared.
+    position : (3,) array
+        Mounting point in the base [m].
+    unit : float
+        Factor by which a hypothesis has multiplied the readings.
+    """
+
+    values: Floats
+    present: Floats
+    sigma: float
+    axes: Floats
+    position: Floats
+    unit: float = 1.0
+
+    @property
+    def in_base(self) -> Floats:
+        """Readings in base axes, shape (n, 3)."""
+        return self.values @ self.axes.T
+
+
+@dataclass(frozen=True)
+class ReadingsOnGrid:
+    """Readings of one recording, as recorded or as a hypothesis has them.
+
+    Attributes
+    ----------
+    time : (n,) array
+        Instants [s].
+    joints : JointState
+        Motion of the joints at these instants.
+    sensors : mapping of SensorKind to GridSensor
+        Rate sensor and accelerometer, where the study has them.
+    attitude_time, attitude : (m,) and (m, 4) arrays
+        Samples of the star sensor; empty without one.
+    attitude_sigma : float
+        Its declared noise [rad].
+    start : (4,) array
+        Attitude at time 0 as the study states it.
+    start_sigma : float
+        Standard deviation of that attitude [rad].
+    wheels, force, torque : (n, 3) arrays
+        Recorded actions on the base, base axes.
+    orbit_rate : float
+        Rate of the orbit, 0 without one [rad/s].
+    """
+
+    time: Floats
+    joints: JointState
+    sensors: Mapping[SensorKind, GridSensor]
+    attitude_time: Floats
+    attitude: Floats
+    attitude_sigma: float
+    start: Floats
+    start_sigma: float
+    wheels: Floats
+    force: Floats
+    torque: Floats
+    orbit_rate: float = 0.0
+    names: tuple[str, ...] = field(default=())
+
+    @classmethod
+    def of(cls, model: Model, manoeuvre: Manoeuvre) -> ReadingsOnGrid:
+        """Return the readings of one recording as declared.
+
+        Parameters
+        ----------
+        model : Model
+        manoeuvre : Manoeuvre
+        """
+        recording = manoeuvre.recording
+        series = {
+            sensor.kind: recording.vector(sensor.kind.value, sensor.kind.axes)
+            for sensor in model.sensors
+            if sensor.kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
+        }
+        first = max((times[0] for times, _ in series.values()), default=0.0)
+        last = min((times[-1] for times, _ in series.values()), default=recording.time[-1])
+        fastest = min((float(np.median(np.diff(times))) for times, _ in series.values()), default=1.0)
+        every = max(1, int(np.ceil((last - first) / fastest / MOST)))
+        time = np.arange(first + 0.5 * (every - 1) * fastest, last + 0.1 * fastest, every * fastest)
+        sensors = {}
+        for sensor in model.sensors:
+            if sensor.kind in (SensorKind.RATE, SensorKind.ACCEL):
+                times, values = series[sensor.kind]
+                averaged, present, count = _averages(times, values, time)
+                noise = float(sensor.noise.sigma(float(np.median(np.diff(times)))).max()) / np.sqrt(count)
+                place = np.asarray(sensor.position, dtype=float)
+                sensors[sensor.kind] = GridSensor(averaged, present, noise, sensor.rotation, place)
+        times, attitude = series.get(SensorKind.ATTITUDE, (np.zeros(0), np.zeros((0, 4))))
+        star = model.sensor(SensorKind.ATTITUDE)
+        apart = every if len(times) == 0 else max(1, len(times) // MOST)
+        sigma = 0.0 if star is None else float(star.noise.sigma(float(np.median(np.diff(times)))).max())
+        actions = Actions.from_recording(recording)
+        wrench = actions.zero_order_hold(time)
+        return cls(
+            time,
+            manoeuvre.motion.evaluate(time),
+            sensors,
+            times[::apart],
+            attitude[::apart],
+            sigma,
+            np.asarray(manoeuvre.attitude, dtype=float),
+            manoeuvre.attitude_sigma,
+            actions.wheels(time)[0],
+            wrench[:, :3],
+            wrench[:, 3:],
+            0.0 if model.orbit is None else model.orbit.mean_motion,
+            tuple(joint.name for joint in model.robot.joints),
+        )
+
+    def with_sensor(self, kind: SensorKind, values: Floats, unit: float = 1.0) -> ReadingsOnGrid:
+        """Return the readings with other values of one sensor.
+
+        Parameters
+        ----------
+        kind : SensorKind
+        values : (n, 3) array
+            Sensor axes.
+        unit : float
+            Factor by which they are larger than recorded.
+        """
+        before = self.sensors[kind]
+        changed = replace(before, values=values, unit=unit * before.unit, sigma=unit * before.sigma)
+        return replace(self, sensors={**self.sensors, kind: changed})
+
+    def thinned(self, most: int) -> ReadingsOnGrid:
+        """Return the readings at fewer instants, for a first selection."""
+        use = slice(None, None, max(1, len(self.time) // most))
+        stars = slice(None, None, max(1, len(self.attitude_time) // most))
+        sensors = {
+            kind: replace(sensor, values=sensor.values[use], present=sensor.present[use])
+            for kind, sensor in self.sensors.items()
+        }
+        return replace(
+            self,
+            time=self.time[use],
+            joints=JointState(*(values[use] for values in self.joints)),
+            sensors=sensors,
+            attitude_time=self.attitude_time[stars],
+            attitude=self.attitude[stars],
+            wheels=self.wheels[use],
+            force=self.force[use],
+            torque=self.torque[use],
+        )
+
+    @cached_property
+    def turns(self) -> tuple[Floats, Floats]:
+        """Times (m - 1, 2) between attitudes, and the mean rate of the base between them, (m - 1, 3) [rad/s]."""
+        if len(self.attitude_time) < 2:
+            return np.zeros((0, 2)), np.zeros((0, 3))
+        attitude = Rotation.from_quat(self.attitude)
+        change = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
+        pairs = np.column_stack([self.attitude_time[:-1], self.attitude_time[1:]])
+        return pairs, change / np.diff(pairs, axis=1)
+
+    @cached_property
+    def turned(self) -> Floats:
+        """Rotation from base axes to those at the first instant, by the rates or else by the attitudes, (n, 3, 3)."""
+        if (gyro := self.sensors.get(SensorKind.RATE)) is not None:
+            rate = gyro.in_base
+            steps = Rotation.from_rotvec(0.5 * (rate[1:] + rate[:-1]) * np.diff(self.time)[:, None]).as_matrix()
+            turned = np.empty((len(self.time), 3, 3))
+            turned[0] = np.eye(3)
+            for index, step in enumerate(steps):
+                turned[index + 1] = turned[index] @ step
+            return turned
+        if len(self.attitude_time) > 1:
+            inside = np.clip(self.time, self.attitude_time[0], self.attitude_time[-1])
+            course = Slerp(self.attitude_time, Rotation.from_quat(self.attitude))(inside)
+            return np.asarray((course[0].inv() * course).as_matrix())
+        return np.broadcast_to(np.eye(3), (len(self.time), 3, 3))
+
+
+def _averages(times: Floats, values: Floats, grid: Floats) -> tuple[Floats, Floats, float]:
+    """Return the averages of samples about the instants of a grid, where there are samples, and how many on average."""
+    width = float(grid[1] - grid[0])
+    cell = np.floor((times - grid[0]) / width + 0.5 + 1e-9).astype(int)
+    inside = (cell >= 0) & (cell < len(grid))
+    cell, times, values = cell[inside], times[inside], values[inside]
+    counts = np.bincount(cell, minlength=len(grid))
+    filled = counts > 0
+
+    def mean(samples: Floats) -> Floats:
+        return np.bincount(cell, samples, len(grid))[filled] / counts[filled]
+
+    at = mean(times)
+    averaged = np.stack([np.interp(grid, at, mean(samples)) for samples in values.T], axis=1)
+    nearest = np.abs(at[np.clip(np.searchsorted(at, grid), 0, len(at) - 1)] - grid)
+    before = np.abs(at[np.clip(np.searchsorted(at, grid) - 1, 0, len(at) - 1)] - grid)
+    return averaged, np.minimum(nearest, before) <= SPREAD * width, float(counts[filled].mean())
