@@ -76,9 +76,12 @@ def diagnose_study(
     from bayesid.app.functions.diagnose_study import VERDICT, diagnose, followed_up
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
+    from bayesid.app.study_to_conventions import convention_lines, remedy_sentence
     from bayesid.app.study_to_design import FILE, write_motion
     from bayesid.inference.posterior_file import write_netcdf
+    from bayesid.recording.convention import ConventionError
     from bayesid.report import diagnosis_report
+    from bayesid.report.convention_report import convention_report, convention_verdict
     from bayesid.report.diagnosis.diagnosis_sentences import diagnosis_sentences
     from bayesid.report.verdict_record import record_sentence
 
@@ -86,7 +89,17 @@ def diagnose_study(
     sample = effective_samples is not None
     with claimed_folder(output):
         whole = part_of(progress, 0.0, VERDICT) if sample else progress
-        result = diagnose(study, seed=seed, sample=False, fly_next=False, progress=whole)
+        try:
+            result = diagnose(study, seed=seed, sample=False, fly_next=False, progress=whole)
+        except ConventionError as error:
+            with complete_folder(output) as folder:
+                write_json(folder / "diagnosis.json", convention_verdict(error.conventions))
+                origin = report_origin(study, "diagnose", seed, output=output, sample=sample, fly_next=plan)
+                convention_report(error.conventions, study.title, folder / "report.pdf", origin=origin)
+            yield from convention_lines(error.conventions)
+            yield remedy_sentence(study.file)
+            yield f"Wrote {output / 'report.pdf'}."
+            return
         yield from diagnosis_sentences(result)
         if sample or (plan and result.rivals):  # both take long: the verdict is not to be lost with them
             with complete_folder(output) as folder:

@@ -15,14 +15,31 @@ __all__ = ["run"]
 
 
 def run(
-    robot: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="Robot, as URDF or MJCF.")],
-    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="CSV or Parquet files.")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")],
+    robot: Annotated[Path | None, typer.Argument(metavar="ROBOT.urdf", help="Robot, as URDF or MJCF.")] = None,
+    recordings: Annotated[
+        list[Path] | None, typer.Argument(metavar="RECORDING...", help="CSV or Parquet files.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")
+    ] = None,
     nearest_physical: Annotated[
         bool, typer.Option("--nearest-physical", help="Give links with impossible inertias the nearest possible one.")
     ] = False,
+    fix: Annotated[
+        Path | None,
+        typer.Option("--fix", metavar="STUDY.toml", help="Study into which remedies of wrong conventions are written."),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Write them without asking.")] = False,
 ) -> Iterator[str]:
     """Draft a study file for a robot and its recordings, with marks where something could not be known."""
+    if fix is not None:
+        from bayesid.app.convention_remedies import fixed_study
+
+        yield from fixed_study(fix, (lambda question: True) if yes else typer.confirm)
+        return
+    if robot is None or not recordings or output is None:
+        problem = "robot, recordings and --output are needed"
+        raise InputError(problem, remedy="bayesid init ROBOT.urdf RECORDING... --output STUDY.toml")
     if output.exists():
         raise InputError("the file exists", file=output, remedy="Choose another output; init overwrites nothing")
     if output.suffix != ".toml":

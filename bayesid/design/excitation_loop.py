@@ -36,6 +36,7 @@ from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
 from bayesid.design.trajectory_search import Search, Store
+from bayesid.inference.conventions import refuse_conventions
 from bayesid.inference.data import RecordedSamples
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
@@ -203,7 +204,9 @@ class Loop:
         file = history.path(number, "identification")
         recording = Recording.read(history.path(number, "recording"))
         self._check(recording)
-        posterior = Posterior.of(model, [flown(self.problem.plan, recording, self.encoder)])
+        manoeuvre = flown(self.problem.plan, recording, self.encoder)
+        refuse_conventions(model, [manoeuvre])
+        posterior = Posterior.of(model, [manoeuvre])
         if all(prior.spread <= NARROW for prior in model.priors):
             refuse_wrong_units(posterior)
         if history.entry(number, "recording") is None:

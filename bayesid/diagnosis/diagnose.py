@@ -26,6 +26,7 @@ from bayesid.diagnosis.search.misfit import with_misfit
 from bayesid.diagnosis.search.model_search import search_models
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference import Identification, identify
+from bayesid.inference.conventions import refuse_conventions
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.wrong_units import refuse_wrong_units
@@ -79,8 +80,10 @@ def diagnose(
     Raises
     ------
     InputError
-        If the numbers of a recording cannot be in the units of the format.
+        If the numbers of a recording cannot be in the units of the format, or another convention is wrong
+        (`ConventionError`).
     """
+    refuse_conventions(model, manoeuvres)
     rng, clock = np.random.default_rng(seed), PhaseClock()
     whole, model, prior = model, model.without_torque, prior or CausePrior()
     catalogue = _catalogue(model, manoeuvres, knows_latitude) if effects is None else list(effects)

@@ -302,6 +302,7 @@ class Diagnosis(ShortForm):
             "status": verdict.status.value,
             "causes": [name for name in verdict.causes if name in probabilities.causes],
             "remainder": {"probability": self.remainder.probability, "verdict": self.remainder.verdict.value},
+            "conventions": [],  # a wrong one ends a diagnosis before its search
             "equivalent_to": {cause: list(names) for cause, names in verdict.equivalent_to.items()},
             "ambiguous_with": [list(names) for names in verdict.ambiguous_with],
             "probability": {

@@ -167,7 +167,7 @@ class RecordedAs:
             return
         present = np.isfinite(columns[names[0]])
         sign = -1.0 if convention.reflected else 1.0  # the readings are reflected by now
-        gravity = np.broadcast_to(sign * np.array(convention.gravity), (int(present.sum()), 3))
+        gravity = np.tile(sign * np.array(convention.gravity), (int(present.sum()), 1))
         if convention.in_space:
             turned = self._turned(columns, columns["time"][present])
             mounting = Rotation.from_matrix(self.mountings.get("accel", np.eye(3)))

@@ -246,16 +246,19 @@ class BalanceProblem:
         start, drift, rate_error, accel_error = (nuisance[:, None, 3 * k : 3 * k + 3] for k in range(4))
         composite, seen = self._composite(bodies), self.readings
         share = ((seen.time - seen.time[0]) / (seen.time[-1] - seen.time[0]))[:, None]
-        pushed = _accumulated(seen.time, np.einsum("tij,tj->ti", seen.turned, seen.torque))
+        about_centre = seen.torque - _cross(composite.centre[0], seen.force)
+        pushed = _accumulated(seen.time, np.einsum("tij,tj->ti", seen.turned, about_centre))
         turned = start + drift * share + pushed
-        momentum = np.einsum("tij,bti->btj", seen.turned, turned) - seen.wheels
-        rate = _times(composite.inverse, momentum - composite.spin)
+        momentum = np.einsum("tij,bti->btj", seen.turned, turned)
+        rate = _times(composite.inverse, momentum - seen.wheels - composite.spin)
         result = {}
         if (gyro := seen.sensors.get(SensorKind.RATE)) is not None:
             miss = (gyro.in_base - rate - rate_error)[:, gyro.present]
             result["rate"] = miss.reshape(len(z), -1)
         if (accelerometer := seen.sensors.get(SensorKind.ACCEL)) is not None:
-            expected = composite.acceleration(rate, momentum, seen.torque, seen.force, accelerometer.position)
+            expected = composite.acceleration(
+                rate, momentum, seen.torque - seen.wheel_torque, seen.force, accelerometer.position
+            )
             miss = (accelerometer.in_base - expected - accel_error)[:, accelerometer.present]
             result["accel"] = miss.reshape(len(z), -1)
         pairs, turning = seen.turns

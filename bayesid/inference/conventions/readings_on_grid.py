@@ -74,8 +74,10 @@ class ReadingsOnGrid:
         Attitude at time 0 as the study states it.
     start_sigma : float
         Standard deviation of that attitude [rad].
-    wheels, force, torque : (n, 3) arrays
-        Recorded actions on the base, base axes.
+    wheels, wheel_torque : (n, 3) arrays
+        Momentum of the wheels and its derivative, base axes [N m s, N m].
+    force, torque : (n, 3) arrays
+        Recorded actions on the base, base axes [N, N m].
     orbit_rate : float
         Rate of the orbit, 0 without one [rad/s].
     """
@@ -89,6 +91,7 @@ class ReadingsOnGrid:
     start: Floats
     start_sigma: float
     wheels: Floats
+    wheel_torque: Floats
     force: Floats
     torque: Floats
     orbit_rate: float = 0.0
@@ -126,8 +129,9 @@ class ReadingsOnGrid:
         star = model.sensor(SensorKind.ATTITUDE)
         apart = every if len(times) == 0 else max(1, len(times) // MOST)
         sigma = 0.0 if star is None else float(star.noise.sigma(float(np.median(np.diff(times)))).max())
-        actions = Actions.from_recording(recording)
+        actions = Actions.from_recording(recording, model.robot.wheels)
         wrench = actions.zero_order_hold(time)
+        wheels, wheel_torque = actions.wheels(time)
         return cls(
             time,
             manoeuvre.motion.evaluate(time),
@@ -137,7 +141,8 @@ class ReadingsOnGrid:
             sigma,
             np.asarray(manoeuvre.attitude, dtype=float),
             manoeuvre.attitude_sigma,
-            actions.wheels(time)[0],
+            wheels,
+            wheel_torque,
             wrench[:, :3],
             wrench[:, 3:],
             0.0 if model.orbit is None else model.orbit.mean_motion,
@@ -175,6 +180,7 @@ class ReadingsOnGrid:
             attitude_time=self.attitude_time[stars],
             attitude=self.attitude[stars],
             wheels=self.wheels[use],
+            wheel_torque=self.wheel_torque[use],
             force=self.force[use],
             torque=self.torque[use],
         )

@@ -1,0 +1,117 @@
+"""Remedies of wrong conventions, written into a study file key by key, after asking."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from bayesid._io.errors import InputError
+from bayesid._io.files import write_text
+from bayesid.app.schema import Study
+from bayesid.app.study_to_conventions import convention_lines
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.inference.conventions import find_conventions
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.wrong_units import refuse_wrong_units
+from bayesid.recording.convention import Convention, ConventionError
+
+__all__ = ["conventions_of", "fixed_study", "with_remedies"]
+
+ROUNDS = 4  # largest number of times that a study is put right: a unit of time hides all other mistakes
+LIKELY = 0.5  # probability from which a remedy is offered
+
+
+def conventions_of(study: Study) -> list[Convention]:
+    """Return the wrong conventions of a study, however they show.
+
+    Parameters
+    ----------
+    study : Study
+    """
+    try:
+        model = load_model(study)
+        manoeuvres = load_manoeuvres(study, model.robot)
+        if conventions := find_conventions(model, manoeuvres):
+            return conventions
+        refuse_wrong_units(Posterior.of(model, manoeuvres, window=0))
+    except ConventionError as error:
+        if error.conventions:
+            return list(error.conventions)
+        raise
+    return []
+
+
+def fixed_study(file: Path, agrees: Callable[[str], bool]) -> Iterator[str]:
+    """Write the remedies of a study's wrong conventions into its file, until none is left.
+
+    Parameters
+    ----------
+    file : Path
+        Study file.
+    agrees : callable
+        Asks whether a remedy is to be written.
+
+    Yields
+    ------
+    str
+        Sentences to show.
+    """
+    for _ in range(ROUNDS):
+        conventions = conventions_of(Study.load(file))
+        offered = [convention for convention in conventions if convention.probability >= LIKELY]
+        yield from convention_lines(conventions)
+        if conventions and not offered:
+            yield "These cannot be told apart: choose one, and write it into the study."
+        accepted = [
+            offer for offer in offered if agrees(f"Write into {file.name}: {'; '.join(offer.remedy.splitlines())}?")
+        ]
+        if not accepted:
+            yield f"{file}: {'nothing was written' if conventions else 'no convention is wrong'}."
+            return
+        text = with_remedies(file.read_text(encoding="utf-8-sig"), [convention.remedy for convention in accepted])
+        Study.from_mapping(tomllib.loads(text), file)
+        write_text(file, text)
+        yield f"Wrote {len(accepted)} of {len(conventions)} remedies into {file}."
+
+
+def _question(file: Path, convention: Convention) -> str:
+    return f"Write into {file.name}: {'; '.join(convention.remedy.splitlines())}?"
+
+
+def with_remedies(text: str, remedies: Sequence[str]) -> str:
+    """Return the text of a study with lines of other keys, which replace those that stand there.
+
+    Parameters
+    ----------
+    text : str
+    remedies : sequence of str
+        Each a header in brackets with its keys, or several of them.
+    """
+    lines = text.splitlines()
+    header = ""
+    for line in (line for remedy in remedies for line in remedy.splitlines()):
+        if line.startswith("["):
+            header = line
+            if _place(lines, header) is None:
+                lines += ["", header]
+            continue
+        key = line.partition("=")[0].strip()
+        start = _place(lines, header)
+        if start is None:
+            raise InputError(f"the study has no section {header}", remedy=f"Write it: {line}")
+        end = next((i for i in range(start + 1, len(lines)) if lines[i].lstrip().startswith("[")), len(lines))
+        same = [i for i in range(start + 1, end) if re.match(rf"\s*{re.escape(key)}\s*=", lines[i])]
+        if same:
+            lines[same[0]] = line
+        else:
+            lines.insert(start + 1, line)
+    return "\n".join([*lines, ""])
+
+
+def _place(lines: Sequence[str], header: str) -> int | None:
+    """Return the number of the line with a header, however its name is quoted."""
+    plain = header.replace('"', "").strip()
+    same = (i for i, line in enumerate(lines) if line.partition("#")[0].replace('"', "").strip() == plain)
+    return next(same, None)

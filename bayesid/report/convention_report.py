@@ -1,0 +1,75 @@
+"""The result and report of a diagnosis that ends with wrong conventions: nothing else can be said of the simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bayesid.diagnosis.evidence.verdict import Rest, Status
+from bayesid.recording.convention import Convention
+from bayesid.report.document import Document
+from bayesid.report.numbers import format_probability
+
+__all__ = ["convention_report", "convention_verdict"]
+
+CERTAIN = 0.9  # probability from which a convention is named without alternatives
+
+
+def convention_verdict(conventions: Sequence[Convention]) -> dict[str, Any]:
+    """Return the content of diagnosis.json: explained by them, or ambiguous where some exclude one another.
+
+    Parameters
+    ----------
+    conventions : sequence of Convention
+    """
+    certain = [convention.name for convention in conventions if convention.probability >= CERTAIN]
+    others = [convention.name for convention in conventions if convention.probability < CERTAIN]
+    best = [*certain, *others[:1]]
+    status = Status.AMBIGUOUS if len(others) > 1 else Status.EXPLAINED
+    probability: dict[str, float] = {}
+    for convention in conventions:
+        probability[convention.name] = min(1.0, probability.get(convention.name, 0.0) + convention.probability)
+    return {
+        "status": status.value,
+        "causes": list(dict.fromkeys(best)),
+        "equivalent_to": {},
+        "ambiguous_with": [list(dict.fromkeys([*certain, other])) for other in others[1:]],
+        "conventions": [convention.to_dict() for convention in conventions],
+        "probability": {"nothing": 0.0, "unknown": 0.0, "causes": probability},
+        "candidates": [],
+        "sets": [],
+        "remainder": {"probability": 0.0, "verdict": Rest.NONE.value},
+    }
+
+
+def convention_report(conventions: Sequence[Convention], title: str, file: Path, *, origin: str = "") -> None:
+    """Write the report of one page.
+
+    Parameters
+    ----------
+    conventions : sequence of Convention
+    title : str
+        Title of the study.
+    file : path
+    origin : str, optional
+        Where the report comes from.
+    """
+    document = Document(title, "Diagnosis")
+    document.foot(origin)
+    document.section("Wrong conventions")
+    document.paragraph(
+        "The recordings contradict what the study says of them, and follow the simulation once it is put right. Causes "
+        "in the simulation are not looked for before."
+    )
+    document.items([convention.text for convention in conventions])
+    document.table(
+        ["convention", "probability:", "remedy in the study"],
+        [
+            [convention.name, format_probability(convention.probability), "; ".join(convention.remedy.splitlines())]
+            for convention in conventions
+        ],
+        "Wrong conventions with their remedies. Probabilities weigh them by the balance of momentum against each other "
+        "and against something generic that explains nothing in particular.",
+    )
+    document.write(file)

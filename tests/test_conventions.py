@@ -1,0 +1,119 @@
+"""Wrong conventions, hidden in recordings of MuJoCo, are named with a remedy that puts the study right."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesid import InputError, Recording
+from bayesid.app.convention_remedies import conventions_of, with_remedies
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.recorded_as import JointRecordedAs, RecordedAs, SensorRecordedAs
+from studies.conventions.mistakes import MISTAKES
+from studies.truth.bodies import SERVICER3
+from studies.truth.mujoco import Manoeuvres, write_study
+
+QUICK = ("gyro north-east-down", "sign of joint2", "joint1 and joint2 exchanged", "accelerations with gravity")
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    manoeuvres = Manoeuvres(count=1, duration=40.0)
+    return write_study(folder, SERVICER3, np.random.default_rng(3), manoeuvres=manoeuvres).file
+
+
+def spoilt(study: Path, mistake: str, folder: Path) -> Path:
+    copy = shutil.copytree(study.parent, folder / "study") / study.name
+    MISTAKES[mistake].make(copy)
+    return copy
+
+
+def corrected(file: Path, conventions: list[Convention]) -> Study:
+    text = with_remedies(file.read_text(), [convention.remedy for convention in conventions])
+    return Study.from_mapping(tomllib.loads(text), file)
+
+
+def test_a_right_study_has_no_wrong_conventions(study: Path) -> None:
+    assert conventions_of(Study.load(study)) == []
+
+
+@pytest.mark.parametrize(
+    "mistake", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MISTAKES]
+)
+def test_a_mistake_is_named_and_its_remedy_puts_the_study_right(mistake: str, study: Path, tmp_path: Path) -> None:
+    file = spoilt(study, mistake, tmp_path)
+    conventions = conventions_of(Study.load(file))
+    assert [convention.name for convention in conventions] == list(MISTAKES[mistake].names)
+    again = corrected(file, conventions)
+    assert conventions_of(again) == []
+    right, mended = (_in_base_axes(either) for either in (Study.load(study), again))
+    for column, values in right.items():
+        there = np.isfinite(mended[column]) & np.isfinite(values)
+        error = np.abs(mended[column] - values)[there].max()
+        assert error < MISTAKES[mistake].error * (np.nanstd(values) + 1e-3), column
+
+
+def _in_base_axes(study: Study) -> dict[str, np.ndarray]:
+    model = load_model(study)
+    recording = load_manoeuvres(study, model.robot)[0].recording
+    channels = dict(recording.channels)
+    for sensor in model.sensors:
+        if sensor.kind.mounted:
+            names = sensor.kind.columns
+            channels |= dict(zip(names, sensor.rotation @ [channels[name] for name in names], strict=True))
+    return channels
+
+
+TIME = np.arange(0.0, 2.0, 0.1)
+
+
+def test_a_joint_is_converted_and_takes_another_ones_columns() -> None:
+    columns = {"time": TIME, "position.a": np.rad2deg(np.sin(TIME)), "position.b": TIME, "torque.b": TIME}
+    joints = {"a": JointRecordedAs(-1.0, 0.5, 1.0, "b"), "b": JointRecordedAs(1.0, 0.0, np.pi / 180.0, "a")}
+    converted = RecordedAs(joints=joints).converted(columns)
+    np.testing.assert_allclose(converted["position.a"], 0.5 - TIME)
+    np.testing.assert_allclose(converted["position.b"], np.sin(TIME), atol=1e-15)
+    np.testing.assert_allclose(converted["torque.a"], -TIME)
+
+
+def test_late_stamps_and_repeated_readings_are_put_right() -> None:
+    steps = np.floor(TIME * 5.0 + 1e-9) / 5.0
+    columns = {"time": TIME, **{f"rate.{axis}": steps for axis in "xyz"}}
+    converted = RecordedAs(sensors={"rate": SensorRecordedAs(native_rate=5.0, latency=0.05)}).converted(columns)
+    present = np.isfinite(converted["rate.x"])
+    np.testing.assert_allclose(converted["time"][present] + 0.05, converted["rate.x"][present])
+    assert present.sum() == 9  # the first would be before time 0
+
+
+def test_gravity_in_space_is_taken_off_a_base_that_turns() -> None:
+    turn = 0.3 * TIME
+    gravity = 9.8 * np.stack([np.sin(turn), np.cos(turn), 0.0 * turn])
+    columns = {"time": TIME, "rate.x": 0.0 * TIME, "rate.y": 0.0 * TIME, "rate.z": 0.3 + 0.0 * TIME}
+    columns |= {f"accel.{axis}": 0.1 + values for axis, values in zip("xyz", gravity, strict=True)}
+    accel = SensorRecordedAs(gravity=(0.0, 9.8, 0.0), in_space=True)
+    converted = RecordedAs(sensors={"accel": accel}).converted(columns)
+    np.testing.assert_allclose([converted[f"accel.{axis}"] for axis in "xyz"], 0.1, atol=1e-12)
+
+
+def test_times_of_another_unit_are_refused_with_the_line_that_states_it() -> None:
+    channels = {"position.a": np.sin(TIME)}
+    with pytest.raises(ConventionError, match=r'time_unit = "ns"') as caught:
+        Recording("x", None, 1e9 * TIME, channels)
+    assert [convention.name for convention in caught.value.conventions] == ["convention:unit:time"]
+
+
+def test_remedies_replace_keys_and_add_sections() -> None:
+    text = "[sensors.rate]  # gyro\nsigma = 1\nmounting = [0, 0, 0, 1]\n[unknowns]\nbodies = []\n"
+    remedies = ["[sensors.rate]\nmounting = [1, 0, 0, 0]\nreflected = true", '[joints."j"]\nsign = -1']
+    content = tomllib.loads(with_remedies(text, remedies))
+    assert content["sensors"]["rate"] == {"sigma": 1, "mounting": [1, 0, 0, 0], "reflected": True}
+    assert content["joints"] == {"j": {"sign": -1}}
+    with pytest.raises(InputError, match="no section"):
+        with_remedies("", ["sign = 1"])
