@@ -57,6 +57,11 @@ class _MistakeSet:
         return float(sum(gain for fit in self.fits for name, gain in fit.gains.items() if not parts or name in parts))
 
     @property
+    def could_gain(self) -> bool:
+        """Whether the misfit of some part of the balance could fall by as much as it must for a name."""
+        return any(fit.misfit[name] > GAIN * floor for fit in self.fits for name, floor in fit.floors.items())
+
+    @property
     def key(self) -> frozenset[str]:
         return frozenset(f"{mistake.name} {mistake.channel} {id(mistake)}" for mistake in self.mistakes)
 
@@ -101,7 +106,7 @@ class _Search:
 
     def _problem(self, readings: ReadingsOnGrid) -> BalanceProblem:
         """Return the problem, with the tables of others in which the joints move the same."""
-        key = readings.joints.position.tobytes()
+        key = len(readings.time), readings.joints.position.tobytes()
         if key not in self._problems:
             self._problems[key] = self.balance.problem(readings)
         return replace(self._problems[key], readings=readings)
@@ -110,7 +115,7 @@ class _Search:
         """Return the readings as declared, and all sets that were weighed."""
         declared = self.weigh((), 0.0)
         weighed = {declared.key: declared}
-        beam = [declared]
+        beam = [declared] if declared.could_gain else []
         for _ in range(DEEPEST):
             grown: dict[frozenset[str], _MistakeSet] = {}
             for parent in beam:

@@ -50,6 +50,8 @@ class BalanceFit(NamedTuple):
         Profile over the misfit of each sensor, with the prior of the unknowns.
     misfit : dict of str to float
         Mean square of the residual of each sensor, with its floor.
+    floors : dict of str to float
+        What it is at least.
     gains : dict of str to float
         Log evidence that would be gained if nothing were left unexplained.
     z : (p,) array
@@ -58,6 +60,7 @@ class BalanceFit(NamedTuple):
 
     log_evidence: float
     misfit: dict[str, float]
+    floors: dict[str, float]
     gains: dict[str, float]
     z: Floats
 
@@ -149,7 +152,9 @@ class BalanceProblem:
             points = np.concatenate([z[None], z + STEP * np.eye(self.size)[:-6]])
             residuals = self._residuals(points)
             misfit = {name: float((r[0] ** 2).mean()) + self._floors[name] for name, r in residuals.items()}
-            here = BalanceFit(self._evidence(misfit, z), misfit, self._gains(misfit), z)
+            here = BalanceFit(
+                self._evidence(misfit, z), misfit, {name: self._floors[name] for name in misfit}, self._gains(misfit), z
+            )
             if best is None or here.log_evidence > best.log_evidence:
                 best = here
             elif iteration and np.linalg.norm(z - best.z) > 1e-3:
@@ -197,7 +202,7 @@ class BalanceProblem:
             counts["attitude"] = 3.0 * min(INDEPENDENT, float(turns))
         if turns and SensorKind.RATE in self.readings.sensors:
             counts["turning"] = counts["attitude"]
-        if len(self.readings.attitude_time):
+        if self.readings.begins:
             counts["start"] = 6.0
         return counts
 
@@ -268,7 +273,7 @@ class BalanceProblem:
             if gyro is not None:
                 mean = _between(seen.time, gyro.in_base[None] - rate_error, pairs)
                 result["turning"] = (turning - mean).reshape(len(z), -1)
-        if len(seen.attitude_time):
+        if seen.begins:
             off = (Rotation.from_quat(seen.start).inv() * Rotation.from_quat(seen.attitude[0])).as_rotvec()
             result["start"] = np.broadcast_to(off, (len(z), 3))
         return result

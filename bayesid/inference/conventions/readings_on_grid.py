@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.actions import Actions
+from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
@@ -18,6 +19,7 @@ from bayesid.simulation.sensors import SensorKind
 __all__ = ["GridSensor", "ReadingsOnGrid"]
 
 MOST = 160  # number of instants, enough for the motion of a manoeuvre
+GAP = 8.0  # intervals of samples above which nobody knows how the base turned meanwhile
 SPREAD = 2.0  # intervals of the grid from the nearest sample beyond which an instant has no reading
 
 
@@ -112,8 +114,8 @@ class ReadingsOnGrid:
             for sensor in model.sensors
             if sensor.kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
         }
-        first = max((times[0] for times, _ in series.values()), default=0.0)
-        last = min((times[-1] for times, _ in series.values()), default=recording.time[-1])
+        joints = [recording.series(f"position.{name}")[0] for name in _positions(recording)]
+        first, last = _longest_stretch([*joints, *(times for times, _ in series.values())])
         fastest = min((float(np.median(np.diff(times))) for times, _ in series.values()), default=1.0)
         every = max(1, int(np.ceil((last - first) / fastest / MOST)))
         time = np.arange(first + 0.5 * (every - 1) * fastest, last + 0.1 * fastest, every * fastest)
@@ -126,9 +128,13 @@ class ReadingsOnGrid:
                 place = np.asarray(sensor.position, dtype=float)
                 sensors[sensor.kind] = GridSensor(averaged, present, noise, sensor.rotation, place)
         times, attitude = series.get(SensorKind.ATTITUDE, (np.zeros(0), np.zeros((0, 4))))
+        inside = (times >= min(first, time[0])) & (times <= last)
+        times, attitude = times[inside], attitude[inside]
         star = model.sensor(SensorKind.ATTITUDE)
         apart = every if len(times) == 0 else max(1, len(times) // MOST)
-        sigma = 0.0 if star is None else float(star.noise.sigma(float(np.median(np.diff(times)))).max())
+        sigma = (
+            0.0 if star is None or len(times) < 2 else float(star.noise.sigma(float(np.median(np.diff(times)))).max())
+        )
         actions = Actions.from_recording(recording, model.robot.wheels)
         wrench = actions.zero_order_hold(time)
         wheels, wheel_torque = actions.wheels(time)
@@ -195,6 +201,12 @@ class ReadingsOnGrid:
         pairs = np.column_stack([self.attitude_time[:-1], self.attitude_time[1:]])
         return pairs, change / np.diff(pairs, axis=1)
 
+    @property
+    def begins(self) -> bool:
+        """Whether the first attitude was measured at about time 0, for which the study states one."""
+        times = self.attitude_time
+        return len(times) > 1 and bool(times[0] <= 2.0 * np.median(np.diff(times)))
+
     @cached_property
     def turned(self) -> Floats:
         """Rotation from base axes to those at the first instant, by the rates or else by the attitudes, (n, 3, 3)."""
@@ -211,6 +223,26 @@ class ReadingsOnGrid:
             course = Slerp(self.attitude_time, Rotation.from_quat(self.attitude))(inside)
             return np.asarray((course[0].inv() * course).as_matrix())
         return np.broadcast_to(np.eye(3), (len(self.time), 3, 3))
+
+
+def _positions(recording: Recording) -> list[str]:
+    return [joint for joint in recording.joints if f"position.{joint}" in recording.channels]
+
+
+def _longest_stretch(series: list[Floats]) -> tuple[float, float]:
+    """Return first and last time of the longest stretch in which no series (n,) of sample times has a gap."""
+    first, last = max(times[0] for times in series), min(times[-1] for times in series)
+    ends = [(first, first), (last, last)]
+    for times in series:
+        steps = np.diff(times)
+        ends += [(times[k], times[k + 1]) for k in np.flatnonzero(steps > GAP * np.median(steps))]
+    ends.sort()
+    reached, best = ends[0][1], (first, first)
+    for begin, end in ends[1:]:
+        if begin - reached > best[1] - best[0]:
+            best = (reached, begin)
+        reached = max(reached, end)
+    return float(best[0]), float(best[1])
 
 
 def _averages(times: Floats, values: Floats, grid: Floats) -> tuple[Floats, Floats, float]:
