@@ -84,7 +84,7 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
     poses = kinematics(robot, motion.evaluate(times)).pose
     box = equivalent_box(robot.link(robot.base).inertial)
     paths = [sticks_of(robot, pose) for pose in poses]
-    points = np.concatenate([box, *(np.concatenate(path) for path in paths)])
+    points = np.concatenate([box, *(stick for path in paths for stick in path)])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.05 * float((high - low).max())
     spans = high - low + 2.0 * margin
