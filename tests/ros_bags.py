@@ -103,13 +103,17 @@ class Maker:
         header = self.types["std_msgs/msg/Header"]
         seq = {"seq": 0} if "seq" in header.__dataclass_fields__ else {}
         fields = {key: self._value(sent.kind, key, value) for key, value in sent.fields.items()}
-        return self.types[sent.kind](header=header(stamp=time, frame_id=sent.frame, **seq), **fields)
+        if "header" in self.types[sent.kind].__dataclass_fields__:
+            fields["header"] = header(stamp=time, frame_id=sent.frame, **seq)
+        return self.types[sent.kind](**fields)
 
     def _value(self, kind: str, key: str, value: Any) -> Any:
         if key == "name":
             return list(value)
         if key in ("quaternion", "orientation"):
             return self._quaternion(value)
+        if key == "data" and np.ndim(value) == 0:
+            return float(value)
         if key == "child_frame_id":
             return value
         if key == "twist":

@@ -479,3 +479,26 @@ def test_without_the_extra_the_error_names_it(writer, tmp_path, monkeypatch):
     status, output = run(bag, *TOPICS, "--output", tmp_path / "out")
     assert status == 2
     assert "extra `ros`" in output
+
+
+def test_speeds_of_wheels_come_from_joint_states_and_from_plain_numbers(flown, writer, tmp_path):
+    """Numbers without a header have the time of their arrival; a name that a topic of joints holds is no joint then."""
+    for k, time in enumerate(np.arange(0.0, 30.0, 0.5)):
+        both = {"name": ["w1", "w2"], "position": [], "velocity": [10.0 + k, -float(k)], "effort": []}
+        writer.add("/wheels", "sensor_msgs/msg/JointState", time, both)
+        writer.add("/third", "std_msgs/msg/Float64", time, {"data": 3.0 * k})
+    bag = writer.write(tmp_path, "ros1")
+    wheels = "--wheels", "/wheels", "--wheels", "w3=/third"
+    status, output = run(bag, *TOPICS, *wheels, "--output", tmp_path / "out")
+    assert status == 0, output
+    assert "Taken as the speed in rad/s of w1, w2." in output
+    read = Recording.read(tmp_path / "out" / "flight.csv")
+    assert read.wheels == ("w1", "w2", "w3")
+    assert set(read.joints) == set(flown.joints)
+    for name, slope, first in (("w1", 1.0, 10.0), ("w2", -1.0, 0.0), ("w3", 3.0, 0.0)):
+        times, speed = read.series(f"wheel_speed.{name}")
+        np.testing.assert_allclose(speed, first + slope * np.arange(60))
+        np.testing.assert_allclose(times, np.arange(0.0, 30.0, 0.5), atol=1e-8)
+    status, output = run(bag, "--imu", "/imu", "--wheels", "a,b=/third", "--output", tmp_path / "other")
+    assert status == 2
+    assert "2 names for messages of 1 elements" in output

@@ -231,3 +231,16 @@ def test_an_impossible_inertia_is_refused_or_replaced_on_request_and_the_study_s
     model = load_model(Study.load(study))
     assert model.robot.link("link3").inertial.is_extended
     assert "Link link3" in model.robot.remarks[0]
+
+
+def test_a_wheel_whose_speed_is_recorded_gets_a_section(flown, tmp_path):
+    files = copied(flown, tmp_path)
+    for file in files[1:]:
+        read = Recording.read(file)
+        channels = {**read.channels, "wheel_speed.wheel1": 10.0 + 0.0 * read.time}
+        Recording(read.name, None, read.time, channels).write(file)
+    study = drafted(files, tmp_path / "study.toml")
+    (wheel,) = study["robot"]["wheels"]
+    assert (wheel["name"], wheel["axis"]) == ("wheel1", [0.0, 0.0, 1.0])
+    assert 1e-6 < wheel["inertia"] < 1.0
+    assert load_model(Study.load(tmp_path / "study.toml")).robot.wheels[0].name == "wheel1"

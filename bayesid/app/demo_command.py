@@ -6,8 +6,11 @@ import json
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import typer
+
+from bayesid._io.errors import InputError
 from bayesid._io.files import create_folder, write_text
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Samples, Seed
@@ -18,12 +21,22 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 
-def run(output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0) -> Iterator[str]:
+EXAMPLES = {"arm": "demonstration_data", "wheels": "demonstration_data_of_wheels"}
+"""Folders of the shipped studies by their names."""
+
+
+def run(
+    output: Output,
+    progress: Progress,
+    seed: Seed = 0,
+    effective_samples: Samples = 4000.0,
+    example: Annotated[str, typer.Option(metavar="NAME", help=f"Study: {', '.join(EXAMPLES)}.")] = "arm",
+) -> Iterator[str]:
     """Diagnose shipped recordings with a hidden cause, show that cause and write the report, without any input file."""
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
 
-    answer = _copy_demonstration(output / "study")
+    answer = _copy_demonstration(example, output / "study")
     yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
     result: list[Diagnosis] = []
     study = Study.load(output / "study" / "study.toml")
@@ -34,16 +47,24 @@ def run(output: Output, progress: Progress, seed: Seed = 0, effective_samples: S
         yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
 
 
-def _copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
-    """Copy the shipped study into a folder.
+def _copy_demonstration(example: str, folder: Path) -> dict[str, dict[str, float]]:
+    """Copy a shipped study into a folder.
+
+    Parameters
+    ----------
+    example : str
+        Name of the study.
+    folder : Path
 
     Returns
     -------
     dict
         True values of the effects hidden in its recordings, by effect and key, in SI units.
     """
+    if example not in EXAMPLES:
+        raise InputError(f"there is no example {example!r}", remedy=f"Choose one of {', '.join(EXAMPLES)}")
     create_folder(folder)
-    shipped = files("bayesid.app") / "demonstration_data"
+    shipped = files("bayesid.app") / EXAMPLES[example]
     answer: dict[str, dict[str, float]] = {}
     for entry in shipped.iterdir():
         text = entry.read_text(encoding="utf-8")

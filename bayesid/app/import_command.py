@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bayesid.app.options import Output
+from bayesid.recording.recording import WHEEL_SPEED
 
 if TYPE_CHECKING:
     from bayesid.recording.bag_import import ImportedTopic
@@ -19,8 +20,18 @@ __all__ = ["run"]
 
 def run(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="File .bag of ROS 1, or folder of ROS 2.")],
-    joints: Annotated[list[str], typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState; repeatable.")],
     output: Output,
+    joints: Annotated[
+        list[str] | None, typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState; repeatable.")
+    ] = None,
+    wheels: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAMES=]TOPIC",
+            help="Wheels: the velocities of a sensor_msgs/JointState, or std_msgs/Float64 or Float64MultiArray, whose "
+            "elements get names with commas; repeatable.",
+        ),
+    ] = None,
     imu: Annotated[str | None, typer.Option(metavar="TOPIC", help="IMU of the base, sensor_msgs/Imu.")] = None,
     attitude: Annotated[
         str | None,
@@ -52,7 +63,16 @@ def run(
 
     window = TimeWindow.of_options(start, end, duration)
     selected = BagTopics(
-        tuple(joints), imu, attitude, tuple(without or ()), velocity, effort, accel, window, most_faulty
+        tuple(joints or ()),
+        imu,
+        attitude,
+        tuple(without or ()),
+        velocity,
+        effort,
+        accel,
+        window,
+        most_faulty,
+        tuple(wheels or ()),
     )
     imported = import_bag(bag, selected)
     recording = imported.recording
@@ -98,6 +118,8 @@ def _meaning(topic: ImportedTopic) -> str:
         units = {"rate": "angular velocity in rad/s", "accel": "acceleration without gravity in m/s2"}
         quantities = " and ".join(units[family] for family in families)
         return f"Taken as {quantities}, in the axes of {frame}; the study gives their mounting on the base."
+    if families == [WHEEL_SPEED]:
+        return f"Taken as the speed in rad/s of {', '.join(column.partition('.')[2] for column in topic.columns)}."
     units = {"position": "rad or m", "velocity": "rad/s or m/s", "torque": "N m or N"}
     joints = dict.fromkeys(column.partition(".")[2] for column in topic.columns)
     quantities = ", ".join(f"{family} in {units[family]}" for family in families)

@@ -19,6 +19,7 @@ from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
 from bayesid.robot.robot import Joint, Robot
+from bayesid.robot.robot_size import RobotSize
 
 __all__ = ["CHECK", "channel_noise", "draft_study", "open_places"]
 
@@ -29,6 +30,7 @@ CHECK = "# please check"
 UNSEEN = {"rate": 1e-5, "accel": 1e-5, "attitude": 1e-5}
 ALIKE = 1.5  # ratio up to which the noises of several axes or joints are written as one number
 NOTES = 32  # column at which the notes begin, unless a value is longer
+ROTOR, ROTOR_RADIUS = 2e-3, 0.05  # mass of a rotor over the robot's, and its radius over the base's length; a guess
 # sensors of the base, with the units of their noise
 UNITS = {"rate": "rad/s", "accel": "m/s2", "attitude": "rad, small rotation in base axes"}
 
@@ -73,6 +75,7 @@ def draft_study(
     sections = [
         _head(title),
         _robot(robot, urdf, folder, nearest_physical),
+        *(_wheel(name, robot) for name in dict.fromkeys(name for each in recordings for name in each.wheels)),
         ORBIT,
         *(_vector_sensor(recordings, family) for family in UNITS),
         _encoder(robot, recordings),
@@ -125,6 +128,19 @@ def _robot(robot: Robot, urdf: Path, folder: Path, nearest_physical: bool) -> st
         _unsure("link_spread = 0.0", "relative uncertainty of all links that are not unknown; 0 = known exactly"),
         "# joints, all of them recorded:" if robot.joints else "# no moving joints",
         *(f"#   {joint.name}: {joint.kind}, {_limits(joint)}" for joint in robot.joints),
+    )
+
+
+def _wheel(name: str, robot: Robot) -> str:
+    """Return the section of a wheel whose speed is recorded, with a guess of its inertia from the robot's size."""
+    size = RobotSize.of(robot)
+    inertia = ROTOR * size.mass * (ROTOR_RADIUS * size.length) ** 2
+    return _section(
+        _line("[[robot.wheels]]", "its recorded speed gives the base its momentum"),
+        f"name = {_quoted(name)}",
+        _unsure("axis = [0.0, 0.0, 1.0]", "unit vector, base axes"),
+        _unsure(f"inertia = {inertia:.1e}", "kg m2 about the axis; at rest part of the base's"),
+        _unsure("position = [0.0, 0.0, 0.0]", "m, base frame; it matters for an imbalance alone"),
     )
 
 

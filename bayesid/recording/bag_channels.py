@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid.recording.recording import NORM_TOLERANCE
+from bayesid.recording.recording import NORM_TOLERANCE, WHEEL_SPEED
 from bayesid.recording.ros_bag import StampedTopic
 
 __all__ = [
     "ATTITUDES",
     "IMU",
     "JOINTS",
+    "WHEELS",
     "Channels",
     "attitude_channels",
     "attitude_fault",
@@ -24,9 +25,12 @@ __all__ = [
     "joint_channels",
     "joint_fault",
     "joint_names",
+    "wheel_channels",
+    "wheel_fault",
 ]
 
 JOINTS = ("sensor_msgs/JointState",)
+WHEELS = (*JOINTS, "std_msgs/Float64", "std_msgs/Float64MultiArray")
 IMU = ("sensor_msgs/Imu",)
 ATTITUDES = (
     "geometry_msgs/QuaternionStamped",
@@ -62,7 +66,9 @@ def joint_fault(message: Any) -> str | None:
     return None
 
 
-def joint_names(topics: Sequence[StampedTopic], without: Sequence[str]) -> tuple[str, ...]:
+def joint_names(
+    topics: Sequence[StampedTopic], without: Sequence[str], wheels: Collection[str] = ()
+) -> tuple[str, ...]:
     """Return the names of the joints of all topics, less those that are not wanted.
 
     Parameters
@@ -70,6 +76,8 @@ def joint_names(topics: Sequence[StampedTopic], without: Sequence[str]) -> tuple
     topics : sequence of StampedTopic
     without : sequence of str
         Joints to leave out.
+    wheels : collection of str
+        Wheels, which are no joints where a topic holds both.
 
     Raises
     ------
@@ -81,7 +89,7 @@ def joint_names(topics: Sequence[StampedTopic], without: Sequence[str]) -> tuple
     for name in without:
         if name not in known:
             raise topics[0].error(f"there is no joint {name!r} to leave out", remedy=f"Joints here: {', '.join(known)}")
-    names = tuple(name for name in known if name not in without)
+    names = tuple(name for name in known if name not in {*without, *wheels})
     if not names:
         raise topics[0].error("no joint is left", remedy="Name a topic that holds the robot's joints")
     for name in names:
@@ -130,6 +138,43 @@ def _joint_family(topic: StampedTopic, names: Sequence[str], field: str, family:
         stamps, rows = np.unique([stamp for stamp, _ in pairs], return_index=True)
         channels[channel] = stamps, np.array([value for _, value in pairs])[rows]
     return channels
+
+
+def wheel_fault(message: Any) -> str | None:
+    """Return what is wrong with a message of wheels: another number of velocities than of names."""
+    names, speeds = getattr(message, "name", None), getattr(message, "velocity", None)
+    if names is None or speeds is None or len(speeds) == len(names):
+        return None
+    return f"{len(speeds)} velocities for {len(names)} wheels"
+
+
+def wheel_channels(topic: StampedTopic, names: Sequence[str]) -> Channels:
+    """Return the speeds of wheels in a topic.
+
+    Parameters
+    ----------
+    topic : StampedTopic
+    names : sequence of str
+        Wheels that are wanted of those that the messages name, or names of the elements where they name none.
+
+    Raises
+    ------
+    InputError
+        If a name is not there, or the messages have no names and other numbers of elements.
+    """
+    if topic.kind in JOINTS:
+        known = dict.fromkeys(name for message in topic.messages for name in message.name)
+        for name in names:
+            if name not in known:
+                raise topic.error(f"there is no wheel {name!r}", remedy=f"Names here: {', '.join(known)}")
+        return _joint_family(topic, names or tuple(known), "velocity", WHEEL_SPEED)
+    rows = [np.atleast_1d(np.asarray(message.data, dtype=float)) for message in topic.messages]
+    if {len(row) for row in rows} != {len(names)}:
+        remedy = f"Name each element: --wheels NAME,NAME={topic.name}"
+        raise topic.error(f"{len(names)} names for messages of {len(rows[0])} elements", remedy=remedy)
+    return {
+        f"{WHEEL_SPEED}.{name}": (topic.stamps, column) for name, column in zip(names, np.array(rows).T, strict=True)
+    }
 
 
 def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:

@@ -22,6 +22,7 @@ from bayesid.recording.bag_channels import (
     ATTITUDES,
     IMU,
     JOINTS,
+    WHEELS,
     Channels,
     attitude_channels,
     attitude_fault,
@@ -30,6 +31,8 @@ from bayesid.recording.bag_channels import (
     joint_channels,
     joint_fault,
     joint_names,
+    wheel_channels,
+    wheel_fault,
 )
 from bayesid.recording.recording import Recording
 from bayesid.recording.ros_bag import StampedTopic, read_topics
@@ -137,6 +140,8 @@ class BagTopics:
         Which part of the bag to take.
     most_faulty : float
         Largest share of a topic's messages that may be left out as faulty.
+    wheels : sequence of str
+        Topics of the wheels' speeds, each as ``TOPIC`` or ``NAME,NAME=TOPIC``.
     """
 
     joints: Sequence[str]
@@ -148,8 +153,17 @@ class BagTopics:
     accel: bool = True
     window: TimeWindow = field(default_factory=TimeWindow)
     most_faulty: float = MOST_FAULTY
+    wheels: Sequence[str] = ()
+
+    @property
+    def named_wheels(self) -> dict[str, tuple[str, ...]]:
+        """Names of the wheels by the topic of their speeds; none where the topic names them itself."""
+        parts = [text.rpartition("=") for text in self.wheels]
+        return {topic: tuple(names.split(",")) if names else () for names, _, topic in parts}
 
     def __post_init__(self) -> None:
+        if not self.joints and not self.wheels:
+            raise InputError("nothing that moves is named", remedy="Give --joints TOPIC, --wheels TOPIC or both")
         if self.imu is None and self.attitude is None:
             raise InputError("no sensor of the base is named", remedy="Give --imu TOPIC, --attitude TOPIC or both")
         # one topic may be both: an IMU may tell its attitude, too
@@ -205,7 +219,9 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
         If the bag or a topic cannot be read, the topics are stamped by different clocks, a topic has no message in the
         window, too many messages of one are faulty, a joint is in two topics, or the IMU feels gravity.
     """
-    kinds: dict[str, tuple[str, ...]] = dict.fromkeys(selected.joints, JOINTS)
+    kinds: dict[str, tuple[str, ...]] = dict.fromkeys(selected.named_wheels, WHEELS) | dict.fromkeys(
+        selected.joints, JOINTS
+    )
     for name, allowed in ((selected.attitude, ATTITUDES), (selected.imu, IMU)):
         kinds |= {} if name is None else {name: allowed}
     whole = read_topics(bag, kinds)
@@ -214,9 +230,12 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
     def sound(name: str, fault: Callable[[Any], str | None]) -> StampedTopic:
         return whole[name].sound(fault, selected.most_faulty, between)
 
-    arms = [sound(name, joint_fault) for name in selected.joints]
-    names = joint_names(arms, selected.without)
     read: list[tuple[StampedTopic, Channels, str]] = []
+    spun = [(sound(name, wheel_fault), wheels) for name, wheels in selected.named_wheels.items()]
+    read += [(topic, wheel_channels(topic, wheels), "") for topic, wheels in spun]
+    wheels = {channel.partition(".")[2] for _, channels, _ in read for channel in channels}
+    arms = [sound(name, joint_fault) for name in selected.joints]
+    names = joint_names(arms, selected.without, wheels) if arms else ()
     for topic in arms:
         used = topic.kept([not set(names).isdisjoint(message.name) for message in topic.messages])
         read.append((used, joint_channels(used, names, velocity=selected.velocity, effort=selected.effort), ""))
@@ -227,9 +246,10 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
         base.append((sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel)))
     if selected.attitude is not None:
         base.append((sound(selected.attitude, attitude_fault), attitude_channels))
-    _refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
+    moving = [*arms, *(topic for topic, _ in spun)]
+    _refuse_mixed_clocks([*moving, *(topic for topic, _ in base)])
     for topic, channels_of in base:
-        inside = _during(arms[0], topic, known)
+        inside = _during(moving[0], topic, known)
         read.append((inside, channels_of(inside), inside.frame()))
     topics = tuple(
         _described(topic, channels, frame, len(whole[topic.name].messages)) for topic, channels, frame in read

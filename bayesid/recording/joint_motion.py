@@ -217,6 +217,8 @@ def check_joints(recording: Recording, robot: Robot) -> None:
         if strangers:
             parts.append(f"joint {', '.join(strangers)} is not one of the robot's")
         remedy = f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path"
+        if spun := [name for name in missing if name in recording.wheels]:
+            remedy = f"A wheel of [[robot.wheels]] is no joint: make {', '.join(spun)} fixed in the URDF"
         raise InputError("; ".join(parts), file=recording.file or recording.name, remedy=remedy)
 
 

@@ -258,9 +258,14 @@ def _check_topic(bag: Path, name: str, allowed: Sequence[str], kinds: Mapping[st
         raise InputError(problem, file=bag, place=f"topic {name}", remedy=f"Name a topic of {' or '.join(allowed)}")
 
 
+def _stamp(message: Any, arrival: int) -> int:
+    """Return the stamp of a message [ns], which is its arrival where its type has no header."""
+    header = getattr(message, "header", None)
+    return arrival if header is None else int(header.stamp.sec * 10**9 + header.stamp.nanosec)
+
+
 def _stamped(bag: Path, name: str, kind: str, read: Sequence[tuple[int, Any, bytes]]) -> StampedTopic:
-    headers = [message.header for _, message, _ in read]
-    stamps = np.array([header.stamp.sec * 10**9 + header.stamp.nanosec for header in headers], dtype=np.int64)
+    stamps = np.array([_stamp(message, arrival) for arrival, message, _ in read], dtype=np.int64)
     arrivals = np.array([arrival for arrival, _, _ in read], dtype=np.int64)
     messages, contents = tuple(message for _, message, _ in read), tuple(content for *_, content in read)
     topic = StampedTopic(bag, name, kind, stamps, arrivals, messages, contents)
