@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 
-EXAMPLES = {"arm": "demonstration_data", "wheels": "demonstration_data_of_wheels"}
+EXAMPLES = {"arm": "demonstration_data", "wheels": "demonstration_data_of_wheels", "axes": "demonstration_data"}
 """Folders of the shipped studies by their names."""
+
+TURNED = ("rate", "accel")  # sensors that the example of axes puts in others
 
 
 def run(
@@ -36,6 +38,9 @@ def run(
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
 
+    if example == "axes":
+        yield from _other_axes(output, seed, progress)
+        return
     answer = _copy_demonstration(example, output / "study")
     yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
     result: list[Diagnosis] = []
@@ -45,6 +50,24 @@ def run(
     for cause, values in answer.items():
         parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
         yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
+
+
+def _other_axes(output: Path, seed: int, progress: Progress) -> Iterator[str]:
+    """Put rate sensor and accelerometer of the recordings in north-east-down axes, diagnose, and put that right."""
+    from bayesid.app.convention_remedies import fixed_study
+    from bayesid.app.diagnose_command import diagnose_study
+    from bayesid.app.schema import Study
+    from bayesid.recording.recording import Recording
+
+    folder = output / "study"
+    _copy_demonstration("axes", folder)
+    for file in sorted(folder.glob("*.csv")):
+        recording = Recording.read(file)
+        turned = {f"{family}.{axis}": -recording.channels[f"{family}.{axis}"] for family in TURNED for axis in "yz"}
+        Recording(recording.name, file, recording.time, {**recording.channels, **turned}).write(file)
+    yield f"Recordings of an independent simulator, whose sensors are in north-east-down axes: {folder}."
+    yield from diagnose_study(Study.load(folder / "study.toml"), output, seed, None, progress)
+    yield from fixed_study(folder / "study.toml", lambda question: True)
 
 
 def _copy_demonstration(example: str, folder: Path) -> dict[str, dict[str, float]]:

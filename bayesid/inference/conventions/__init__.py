@@ -13,11 +13,12 @@ from bayesid.inference.conventions import (  # the families register themselves
     sensor_axes,
 )
 from bayesid.inference.conventions.convention_search import find_conventions, refuse_conventions
-from bayesid.inference.conventions.mistake import Mistake, MistakeFamily
+from bayesid.inference.conventions.mistake import Mistake, MistakeFamily, convention_families
 
 __all__ = [
     "Mistake",
     "MistakeFamily",
+    "convention_families",
     "exchanged_joints",
     "find_conventions",
     "gravity_in_readings",

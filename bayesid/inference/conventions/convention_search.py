@@ -16,7 +16,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import log_sum
 from bayesid.inference.conventions.joint_counting import zero_of
-from bayesid.inference.conventions.mistake import Mistake, families
+from bayesid.inference.conventions.mistake import Mistake, convention_families
 from bayesid.inference.conventions.momentum_balance import BalanceFit, BalanceProblem, MomentumBalance
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
 from bayesid.recording.convention import Convention, ConventionError
@@ -34,9 +34,9 @@ FEWEST_NATS = 5.0  # gain of log probability for which one more mistake is worth
 BEAM = 2  # number of sets from which larger ones are made
 DEEPEST = 3  # largest number of mistakes at once
 COARSE, FINE = 2, 10  # iterations of the fit that selects members, and of that which weighs them
-KEPT = 8  # number of members that are weighed
+LIKELY, KEPT = 10, 4  # numbers of members that are fitted well at these instants, and that are weighed
 INSTANTS = 40  # number of instants by which members are selected
-RECORDINGS = 3  # number of recordings that are looked at, as a mistake is in all of them
+RECORDINGS = 2  # number of recordings that are looked at, as a mistake is in all of them
 ZERO_STEPS = np.deg2rad([15.0, 5.0, 1.5, 0.5])  # refinement of a joint's zero
 
 
@@ -81,19 +81,19 @@ class _Search:
         """Members of all families, each with the logarithm of its prior."""
         return [
             (mistake, float(np.log(family.prior * mistake.share)))
-            for family in families()
+            for family in convention_families()
             for mistake in family.members(self.model, self.recorded[0])
         ]
 
-    def weigh(self, mistakes: Sequence[Mistake], log_prior: float, coarsely: bool = False) -> _MistakeSet:
+    def weigh(self, mistakes: Sequence[Mistake], log_prior: float, coarsely: int = 0) -> _MistakeSet:
         """Return a set with its fits.
 
         Parameters
         ----------
         mistakes : sequence of Mistake
         log_prior : float
-        coarsely : bool
-            Whether a few iterations at a few instants of one recording do.
+        coarsely : int
+            Iterations at a few instants of one recording, if those do.
         """
         ordered = tuple(sorted(mistakes, key=lambda mistake: mistake.rank))
         fits = []
@@ -101,7 +101,7 @@ class _Search:
             readings = recorded
             for mistake in ordered:
                 readings = mistake.undo(readings)
-            fits.append(self._problem(readings).fit(COARSE if coarsely else FINE))
+            fits.append(self._problem(readings).fit(coarsely or FINE))
         return _MistakeSet(ordered, tuple(fits), log_prior)
 
     def _problem(self, readings: ReadingsOnGrid) -> BalanceProblem:
@@ -123,6 +123,8 @@ class _Search:
                     fine = self._refined(self.weigh(considered.mistakes, considered.log_prior))
                     if fine.log_weight > parent.log_weight + FEWEST_NATS:
                         grown[fine.key] = fine
+                if any(considered.hope() < FEWEST_NATS for considered in grown.values()):
+                    break  # its rivals with one other mistake are there, and other first mistakes lead to the same sets
             weighed |= grown
             beam = sorted(grown.values(), key=lambda considered: -considered.log_weight)[:BEAM]
             if not beam or beam[0].hope() < FEWEST_NATS:
@@ -133,11 +135,13 @@ class _Search:
         """Return the most promising sets with one more mistake."""
         places = {mistake.place for mistake in parent.mistakes}
         sets = [
-            self.weigh((*parent.mistakes, mistake), parent.log_prior + prior, coarsely=True)
+            self.weigh((*parent.mistakes, mistake), parent.log_prior + prior, COARSE)
             for mistake, prior in self.members
             if mistake.place not in places and parent.hope(mistake.seen_by) - FEWEST_NATS > -prior
         ]
-        return sorted(sets, key=lambda considered: -considered.log_weight)[:KEPT]
+        likely = sorted(sets, key=lambda considered: -considered.log_weight)[:LIKELY]
+        fitted = [self.weigh(considered.mistakes, considered.log_prior, FINE) for considered in likely]
+        return sorted(fitted, key=lambda considered: -considered.log_weight)[:KEPT]
 
     def _refined(self, considered: _MistakeSet) -> _MistakeSet:
         """Return the set with the zeros of joints refined."""

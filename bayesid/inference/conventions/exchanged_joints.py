@@ -20,6 +20,8 @@ __all__ = ["ExchangedJoints"]
 class ExchangedJoints(MistakeFamily):
     """Two joints of one kind, each of which could make the other's motion."""
 
+    title = "exchanged joints"
+
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield the pairs."""
         joints, position = model.robot.joints, readings.joints.position

@@ -22,6 +22,8 @@ TOLERANCE = 0.02  # relative difference from standard gravity on the ground, by 
 class GravityInReadings(MistakeFamily):
     """Readings whose mean is gravity, which their unit says up to a factor."""
 
+    title = "gravity in accelerations"
+
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield gravity constant in the sensor's axes, and constant in space, where the readings hold it."""
         accelerometer = readings.sensors.get(SensorKind.ACCEL)

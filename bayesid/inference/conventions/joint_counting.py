@@ -23,6 +23,8 @@ ZEROS = np.deg2rad([-150.0, -120.0, -90.0, -60.0, -45.0, -30.0, 30.0, 45.0, 60.0
 class JointSign(MistakeFamily):
     """A joint whose angle counts the other way."""
 
+    title = "signs of joints"
+
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield each joint that moves."""
         for index, joint in enumerate(model.robot.joints):
@@ -42,6 +44,8 @@ class JointSign(MistakeFamily):
 @MistakeFamily.register
 class JointZero(MistakeFamily):
     """A revolute joint whose angle counts from another zero."""
+
+    title = "zeros of joints"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield usual zeros of every revolute joint; the search refines them (`refined`)."""

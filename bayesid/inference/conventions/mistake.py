@@ -9,7 +9,7 @@ from typing import ClassVar, TypeVar
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
 from bayesid.simulation.model import Model
 
-__all__ = ["Mistake", "MistakeFamily", "families"]
+__all__ = ["Mistake", "MistakeFamily", "convention_families"]
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,13 @@ class MistakeFamily:
 
     Attributes
     ----------
+    title : str
+        What the mistakes are about, in the plural.
     prior : float
         Probability that a recording has a mistake of the family.
     """
 
+    title: ClassVar[str]
     prior: ClassVar[float] = 0.02
 
     _known: ClassVar[list[MistakeFamily]] = []
@@ -82,6 +85,6 @@ class MistakeFamily:
 F = TypeVar("F", bound=MistakeFamily)
 
 
-def families() -> tuple[MistakeFamily, ...]:
+def convention_families() -> tuple[MistakeFamily, ...]:
     """Return all registered families."""
     return tuple(MistakeFamily._known)

@@ -203,7 +203,7 @@ class BalanceProblem:
         if turns and SensorKind.RATE in self.readings.sensors:
             counts["turning"] = counts["attitude"]
         if self.readings.begins:
-            counts["start"] = 6.0
+            counts["start"] = 12.0
         return counts
 
     @cached_property

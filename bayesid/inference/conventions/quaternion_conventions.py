@@ -30,6 +30,9 @@ ORDER, INVERSE = 'order = "wxyz"', "inverse = true"
 FIRST = "Attitudes have the scalar first, w, x, y, z"
 OTHER_WAY = "Attitudes are inverse, from orbit to base axes"
 
+# share of other fixed axes: the chance that axes of any direction agree as well as is asked of the first attitude,
+# the volume of such rotations over that of all, 4/3 pi 0.1^3 / (8 pi^2)
+ANY_AXES = 5e-5
 READINGS = ("attitude", "turning", "start")  # parts of the balance that hold them
 RANK = {"order": 0, "conjugate": 1}
 READ: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
@@ -41,6 +44,8 @@ READ: tuple[tuple[str, str, str, Callable[[Floats], Floats]], ...] = (
 @MistakeFamily.register
 class QuaternionConventions(MistakeFamily):
     """Readings of the star sensor."""
+
+    title = "orders, directions and axes of quaternions"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield order, inverse, and the axes to which they refer."""
@@ -70,7 +75,7 @@ class QuaternionConventions(MistakeFamily):
                 lambda seen, frame=frame: _in_orbit_axes(seen, frame),
                 lambda seen, frame=frame: f'[sensors.attitude]\nframe = "{frame}"',
                 lambda seen, words=words: f"Attitudes are relative to {words}.",
-                0.2,
+                0.2 if frame == "rotating" else ANY_AXES,
                 READINGS,
             )
 
@@ -83,6 +88,8 @@ def _in_orbit_axes(readings: ReadingsOnGrid, frame: str) -> ReadingsOnGrid:
 @MistakeFamily.register
 class StatedAttitude(MistakeFamily):
     """The attitude at time 0 that the study states, beside readings of a star sensor."""
+
+    title = "orders and directions of stated attitudes"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield order and inverse."""

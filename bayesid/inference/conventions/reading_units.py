@@ -21,6 +21,8 @@ __all__ = ["JointUnits", "ReadingUnits"]
 class ReadingUnits(MistakeFamily):
     """Sensors of the base."""
 
+    title = "units of sensors"
+
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield the units of each sensor."""
         for kind in readings.sensors:
@@ -47,6 +49,8 @@ def _in_unit(kind: SensorKind, unit: str, factor: float, share: float) -> Mistak
 @MistakeFamily.register
 class JointUnits(MistakeFamily):
     """All joints in degrees, or in other units of angles."""
+
+    title = "units of joints"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield the units of angles."""

@@ -34,6 +34,8 @@ def right_angles() -> list[Floats]:
 class SensorAxes(MistakeFamily):
     """Rate sensor or accelerometer in other axes."""
 
+    title = "axes of sensors"
+
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield the 47 other axes of each sensor."""
         for kind in readings.sensors:

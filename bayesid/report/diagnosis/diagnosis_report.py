@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from bayesid._io.errors import InputError
+from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference import Identification
+from bayesid.inference.conventions import convention_families
 from bayesid.report.diagnosis.appendix import add_appendix, add_measured
 from bayesid.report.diagnosis.causes_page import add_causes
 from bayesid.report.diagnosis.consequences_page import add_consequences
@@ -15,8 +17,13 @@ from bayesid.report.diagnosis.evidence_page import add_evidence
 from bayesid.report.diagnosis.limits_page import add_assumptions, add_limits
 from bayesid.report.document import Document
 from bayesid.report.identification_report import add_identification
+from bayesid.report.numbers import format_number
 
 __all__ = ["diagnosis_report"]
+
+CONTRADICTED = 10.0
+"""Chi-square per sample of the extended model above which nothing physical is read from it: residuals three times the
+noise, where the linear evidence about the fit has no meaning."""
 
 
 def diagnosis_report(
@@ -40,8 +47,11 @@ def diagnosis_report(
     if origin:
         document.foot(origin)
     document.page()
-    add_evidence(document, result)
-    add_causes(document, result)
+    if result.gain.after.chi2_per_sample > CONTRADICTED:
+        _add_contradiction(document, result)
+    else:
+        add_evidence(document, result)
+        add_causes(document, result)
     add_consequences(document, result)
     add_limits(document, result, result.advice)
     identification = result.identification
@@ -57,6 +67,19 @@ def diagnosis_report(
     elif refusal is None:
         add_measured(document, result)
     document.write(file)
+
+
+def _add_contradiction(document: Document, result: Diagnosis) -> None:
+    document.section("The simulation contradicts the recordings")
+    families = joined([family.title for family in convention_families()])
+    document.paragraph(
+        f"After the fit, with all that is named, chi-square per sample is "
+        f"{format_number(result.gain.after.chi2_per_sample, 3)}, where noise alone gives 1. Of so large a misfit no "
+        "physical cause can be read: the probabilities of causes weigh them against each other only. Tried among wrong "
+        f"conventions of the recordings were {families}; none explains several times more than the study as it stands. "
+        "Check that the robot's file is that of the robot which was recorded, then where sensors are mounted, and "
+        "whether anything moved or acted on it that is not recorded."
+    )
 
 
 def _refusal(result: Diagnosis) -> InputError | None:
