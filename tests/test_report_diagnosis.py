@@ -121,7 +121,7 @@ def disturbance(biased) -> DisturbingWrench:
     torque = np.stack([1e-3 * position, 0.0 * time, 0.0 * time], axis=1)
     same = {frame: [torque] for frame in Frame}
     sd = [np.full_like(torque, 1e-4)]
-    return DisturbingWrench(12.0, ("planar",), [time], same, same, sd, sd, Frame.BASE, 50.0)
+    return DisturbingWrench(12.0, ("planar",), (0,), [time], same, same, sd, sd, Frame.BASE, 50.0)
 
 
 def candidate(**changes) -> Candidate:
@@ -400,7 +400,7 @@ def test_the_spectrum_of_a_wave_is_its_amplitude():
     wave = 0.3 * np.cos(2.0 * np.pi * 0.05 * time)
     torque = [np.stack([wave, 0.0 * time, 0.0 * time], axis=1)]
     same = dict.fromkeys(Frame, torque)
-    disturbance = DisturbingWrench(1.0, ("a",), [time], same, same, torque, torque, None, 0.0)
+    disturbance = DisturbingWrench(1.0, ("a",), (0,), [time], same, same, torque, torque, None, 0.0)
     frequency, amplitude = torque_spectrum(disturbance, 0)
     assert frequency[np.argmax(amplitude[:, 0])] == pytest.approx(0.05, rel=0.01)
     assert amplitude[:, 0].max() == pytest.approx(0.3, rel=0.02)

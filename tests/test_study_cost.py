@@ -34,6 +34,10 @@ def made_up(nested: Nested | None) -> Cost:
             "identify": [Run(40.0, 60.0, 1.0, {}), Run(19.0, 25.0, 1.0, {}), Run(21.0, 25.0, 1.0, {})],
             "design": [Run(200.0, 300.0, 1.0, {}), Run(150.0, 250.0, 1.6, {})],
         },
+        many={
+            "check, 40 recordings": [Run(30.0, 30.0, 0.6, {}), Run(9.0, 9.0, 0.5, {})],
+            "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=2.4)],
+        },
         candidates={10: 1.5, 20: 2.0, 40: 3.0, 46: 4.6},
         growth={"recordings": {1: 2e-4, 2: 4e-4}},
         floor=Floor(6e5, 2.4e6, 3e10, 1e10, 2e-4),
@@ -59,6 +63,8 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
         Verdict.PASS,
         Verdict.OPEN,
         Verdict.FAIL,
+        Verdict.PASS,
+        Verdict.FAIL,  # 2.4 GB
         Verdict.FAIL,
         Verdict.PASS,
     ], verdicts
@@ -67,7 +73,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
     assert "5 s (nothing, leak, payload and link), missed by 2 of 4" in text
-    assert "4 of 11 goals are missed" in text
+    assert "5 of 13 goals are missed" in text
     assert "The files of check, identify and design state no time by phase" in text
     assert "1.50 s" in text
     assert broken_rules(tmp_path / "cost.pdf") == []

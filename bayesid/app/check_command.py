@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bayesid._io.progress import Progress, part_of
 from bayesid._io.words import counted
 from bayesid.app.options import Output, StudyFile
 
 __all__ = ["run"]
 
 
-def run(file: StudyFile, output: Output) -> Iterator[str]:
+def run(file: StudyFile, output: Output, progress: Progress) -> Iterator[str]:
     """Validate a study and its recordings, and report their contents: check.json and report.pdf."""
     from bayesid.app.schema import Study
 
@@ -25,12 +26,13 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     from bayesid.report import check_report
 
     try:
-        result = check(study)
+        result = check(study, progress=part_of(progress, 0.0, 0.5))
     except ConventionError as error:  # so wrong that nothing else can be said
         conventions = [convention.to_dict() for convention in error.conventions]
         with complete_folder(output) as folder:
             write_json(folder / "check.json", {"title": study.title, "conventions": conventions})
         raise
+    progress(0.5, "drawing the report")
     posterior = result.posterior
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {counted(count, 'recording')}, {posterior.samples} samples, {posterior.size} unknowns."

@@ -42,6 +42,11 @@ FULL, CLOSED = "Free space there, and call the command again", "Choose another o
 
 # objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles
 SELDOM = 100_000
+EXHAUSTED = "RESOURCE_EXHAUSTED"  # said by errors of JAX where memory is lacking
+LACKS_MEMORY = (
+    "there is not enough memory for this study. Give fewer or shorter recordings, or fewer blocks per second, or run "
+    "it where more memory is free"
+)
 # remedies by the number of an error of the system
 REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL),
@@ -122,6 +127,11 @@ def _reported() -> Iterator[None]:
         where = "" if error.filename is None else f"{error.filename}: "
         remedy = REMEDIES.get(error.errno or 0, "Check the disk, or choose another output folder")
         typer.secho(f"Error: {where}{error.strerror or error}. {remedy}", fg="red", err=True)
+        raise typer.Exit(2) from None
+    except (MemoryError, RuntimeError) as error:
+        if not (isinstance(error, MemoryError) or EXHAUSTED in str(error)):
+            raise
+        typer.secho(f"Error: {LACKS_MEMORY}", fg="red", err=True)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
         typer.echo("Interrupted; called again, the command goes on from what it has kept, or starts anew.", err=True)

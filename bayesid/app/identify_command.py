@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from bayesid._io.progress import Progress
+from bayesid._io.progress import Progress, part_of
 from bayesid.app.options import Output, Samples, Seed, StudyFile
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def run(
     from bayesid.report import identification_report
 
     clock = PhaseClock()
-    posterior = recorded_posterior(study)
+    posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
     yield from open_places(study)
     clock.ends("load")

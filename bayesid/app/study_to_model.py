@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
 from bayesid._io.store import file_key
 from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
 from bayesid.app.schema.sensor_sections import FilteredSensor
@@ -57,7 +58,7 @@ FARTHEST = 10.0
 CHANGE_SEED = 0  # seed of the draws of an uncertain mass-property change, so that a study always has the same prior
 
 
-def load_posterior(study: Study, window: int | None = None) -> Posterior:
+def load_posterior(study: Study, window: int | None = None, progress: Progress = silent) -> Posterior:
     """Read all files that a study names, and return its posterior.
 
     Parameters
@@ -65,6 +66,8 @@ def load_posterior(study: Study, window: int | None = None) -> Posterior:
     study : Study
     window : int, optional
         As for `Posterior.of`.
+    progress : Progress, optional
+        Receiver of the share of the recordings that is read.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def load_posterior(study: Study, window: int | None = None) -> Posterior:
         If a file is absent or a rule is broken; the message names file, place, value and remedy.
     """
     model = load_model(study)
-    manoeuvres = load_manoeuvres(study, model.robot)
+    manoeuvres = load_manoeuvres(study, model.robot, progress)
     try:
         refuse_conventions(model, manoeuvres)
     except ConventionError as error:
@@ -185,18 +188,23 @@ def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tup
     return (*known, *links), carried.mixing(links)
 
 
-def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
+def load_manoeuvres(study: Study, robot: Robot, progress: Progress = silent) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion.
 
     Parameters
     ----------
     study : Study
     robot : Robot
+    progress : Progress, optional
+        Receiver of the share that is read.
     """
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     _check_latitudes(study)
-    manoeuvres = [_load_manoeuvre(study, section, robot) for section in study.recordings]
+    manoeuvres = []
+    for number, section in enumerate(study.recordings):
+        progress(number / len(study.recordings), f"reading {section.file.name} and smoothing the joints' motion")
+        manoeuvres.append(_load_manoeuvre(study, section, robot))
     _refuse_copies(study, manoeuvres)
     if not study.model.noise:
         return manoeuvres

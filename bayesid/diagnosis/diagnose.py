@@ -20,11 +20,12 @@ from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRe
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model, step_along_data, without_torque
 from bayesid.diagnosis.result import Diagnosis
+from bayesid.diagnosis.run_size import RunSize
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.linearisation import Catalogue
 from bayesid.diagnosis.search.misfit import with_misfit
 from bayesid.diagnosis.search.model_search import search_models
-from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, FULL, DiagnosisSettings
 from bayesid.inference import Identification, identify
 from bayesid.inference.conventions import refuse_conventions
 from bayesid.inference.noise_changes import relinearised
@@ -92,10 +93,12 @@ def diagnose(
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
     refuse_wrong_units(posterior if whole.torque is None else Posterior.of(whole, manoeuvres))
+    size = RunSize.of(posterior, catalogue)
+    size.refuse()
     clock.ends("load")
     rates = posterior.unknowns.layout.all_rates
     perturbed = PerturbedModel(posterior, range(rates.start, rates.stop) if at_rest else ())
-    progress(0.0, "compiling the simulation")
+    progress(0.0, f"compiling the simulation; {size}")
     perturbed.compile()
     clock.ends("compile")
     progress(0.1, "fitting the present model")
@@ -154,12 +157,16 @@ def diagnose(
 
 
 def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bool) -> list[Effect]:
-    """Return the candidates that could be at work in some recordings."""
+    """Return the candidates that could be at work in some recordings.
+
+    Those with amplitudes of their own in each recording are left out where there are many recordings.
+    """
     recordings = [manoeuvre.recording for manoeuvre in manoeuvres]
     wheels = any(recording.wheels or "wheel_momentum.x" in recording.channels for recording in recordings)
     longest = max(float(recording.time[-1]) for recording in recordings)
     possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
-    return [effect for effect in possible if effect.shows_in(recordings)]
+    shown = [effect for effect in possible if effect.shows_in(recordings)]
+    return [effect for effect in shown if len(recordings) <= FULL or not effect.per_recording]
 
 
 def identify_extended(

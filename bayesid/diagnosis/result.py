@@ -11,6 +11,7 @@ from bayesid._io.short_form import ShortForm, Summary, format_probability, forma
 from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.design.design_result import Design
+from bayesid.diagnosis.candidates.generic_cause import FEW
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Remainder, Status, VerdictSensitivity
@@ -19,6 +20,7 @@ from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, 
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
 from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, TorqueCorrelation, torque_correlations
 from bayesid.diagnosis.outcome.gain import (
+    FOLDS,
     Gain,
     ParameterChange,
     SimulationError,
@@ -30,9 +32,9 @@ from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.search.model_search import ModelSearch
-from bayesid.diagnosis.settings import DiagnosisSettings
+from bayesid.diagnosis.settings import FULL, DiagnosisSettings
 from bayesid.inference import Identification
-from bayesid.inference.body_quantities import quantity
+from bayesid.inference.body_quantities import ContractionVerdict, quantity
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect import Effect
@@ -151,6 +153,20 @@ class Diagnosis(ShortForm):
         return [manoeuvre.recording.name for manoeuvre in self.before.fit.posterior.manoeuvres]
 
     @property
+    def bounded(self) -> str | None:
+        """What is weighed in a part of many recordings alone, None where everything is weighed in all of them."""
+        count = len(self.recordings)
+        if count <= FULL:
+            return None
+        return (
+            f"With {count} recordings the work on each is bounded: smooth disturbances of all speeds are weighed in "
+            f"{FEW} of them, slow ones in all; pulses and jumps at fewer instants; causes with a history of their own "
+            "in each recording, such as a wheel's, are no candidates; the disturbance is reconstructed in the "
+            f"{FULL} with the largest residuals; the held-out score leaves out {FOLDS} groups of recordings, by one "
+            "linear step."
+        )
+
+    @property
     def residuals(self) -> list[ResidualView]:
         """Whitened residuals of the present model, and of the extended one where causes are named."""
         return [self.before.fit.view, self.after.fit.view] if self.named else [self.before.fit.view]
@@ -201,6 +217,12 @@ class Diagnosis(ShortForm):
     def parameter_changes(self) -> tuple[ParameterChange, ...]:
         """Inertial parameters of the identified bodies: given, without the named causes, with them."""
         return parameter_changes(self.before, self.gain)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Inertial parameters whose posterior is their prior, so that the recordings do not determine them."""
+        shrinkage = {change.name: 1.0 - change.fitted_sd / change.prior_sd for change in self.parameter_changes}
+        return tuple(n for n, value in shrinkage.items() if ContractionVerdict.of(value) is ContractionVerdict.NOT)
 
     @cached_property
     def simulation_errors(self) -> tuple[SimulationError, ...]:
@@ -318,6 +340,8 @@ class Diagnosis(ShortForm):
                 "correlations": [correlation._asdict() for correlation in self.torque_correlations],
             },
             "joint_torques": _torques(self.torques),
+            "bounded": self.bounded,
+            "undetermined": list(self.undetermined),
             "bodies_held": self.bodies_fixed,
             "gain": _gain(self),
             "inertial_parameters": {change.name: change.to_dict() for change in self.parameter_changes},

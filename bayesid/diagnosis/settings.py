@@ -9,7 +9,11 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-__all__ = ["DEFAULT_SETTINGS", "DiagnosisSettings"]
+__all__ = ["DEFAULT_SETTINGS", "FULL", "DiagnosisSettings"]
+
+FULL = 6
+"""Recordings up to which every course and instant of what nobody listed is weighed in each of them, and every one of
+them is drawn; with more, the work on one recording is bounded."""
 
 
 @dataclass(frozen=True)

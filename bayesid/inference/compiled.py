@@ -197,7 +197,7 @@ def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) 
     return _whitened(arrays.weights, arrays.start, _deviations(structure, numbers, z, _bare(arrays))[None])[0]
 
 
-def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
+def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Floats:
     """Return the derivative of the whitened residual by forward-mode differentiation, shape (size, R, O, C).
 
     Parameters
@@ -209,7 +209,8 @@ def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -
     arrays : Arrays
         Data, which may be `perturbed`.
     """
-    return _whitened(arrays.weights, arrays.start, _slopes(structure, numbers, z, _bare(arrays)))
+    packed = _whitened(arrays.weights, arrays.start, _slopes(structure, numbers, z, _bare(arrays)))
+    return structure.layout.unpacked(np.asarray(packed))
 
 
 @kept_jit(static=1)
@@ -313,8 +314,10 @@ def _deviations(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays
 
 @kept_jit(static=1)
 def _slopes(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the derivatives of the deviations, shape (size, R, T, C)."""
-    return jnp.moveaxis(jax.jacfwd(lambda z: _deviations(structure, numbers, z, arrays))(z), -1, 0)
+    """Return the derivatives of the deviations in packed columns (`Layout.packed`), shape (columns, R, T, C)."""
+    column = structure.layout.packed
+    steps = jnp.zeros(column.max(initial=-1) + 1)
+    return jnp.moveaxis(jax.jacfwd(lambda s: _deviations(structure, numbers, z + s[column], arrays))(steps), -1, 0)
 
 
 @kept_jit(static=1)

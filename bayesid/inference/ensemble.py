@@ -8,6 +8,7 @@ evolution Markov chain with snooker updater and fewer chains, Statistics and Com
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -29,7 +30,7 @@ from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import Parameterisation
 from bayesid.inference.posterior import BATCH
 
-__all__ = ["Chains", "LaplaceMove", "sample"]
+__all__ = ["MOST_SECONDS", "Chains", "LaplaceMove", "sample"]
 
 
 ENSEMBLES = 4
@@ -60,6 +61,9 @@ INDEPENDENT = {True: 0.95, False: 0.5}
 
 STUCK_AFTER, STUCK = 200, 0.02
 """Number of steps from which on a sampler is given up that trusts its proposals, and the share of accepted ones."""
+
+MOST_SECONDS = 1800.0
+"""Longest time that a sampler runs by default [s]."""
 
 KEPT = "positions, log densities, log likelihoods"
 """What the store holds of every step."""
@@ -181,6 +185,7 @@ def sample(
     *,
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
+    max_seconds: float = MOST_SECONDS,
     trusted: bool = False,
     proposal: Proposal | None = None,
     file: str | Path | HDFBackend | None = None,
@@ -201,6 +206,8 @@ def sample(
     max_steps : int
         Largest number of steps of each ensemble; a sampler that stops there may not have converged. One that trusts its
         proposal stops before where hardly any is accepted.
+    max_seconds : float
+        Time after which it stops at the next test of convergence, converged or not [s].
     trusted : bool
         Whether importance sampling trusts the proposal, so that most moves may propose from it.
     proposal : Proposal, optional
@@ -231,13 +238,15 @@ def sample(
         if fresh:
             sampler.random_state = state.get_state()
         samplers.append((sampler, None if not fresh else _start(parameterisation, proposal, walkers, state)))
+    began = time.monotonic()
     while True:
+        late = time.monotonic() - began > max_seconds
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
         if steps and (steps in _tests(steps) or steps >= max_steps):
             chains = _summary(parameterisation, [sampler for sampler, _ in samplers], effective_samples)
             _tell(progress, chains, max_steps, effective_samples)
             # with hardly a move of differential evolution, walkers that accept no proposal stay where they are
-            if chains.converged or steps >= max_steps or (trusted and chains.stuck):
+            if chains.converged or steps >= max_steps or late or (trusted and chains.stuck):
                 return chains
         # after an interruption ensembles stand at different steps; all go on to the end of the block
         target = min(_tests(steps)[-1], max_steps)

@@ -19,6 +19,7 @@ from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
+from bayesid.inference.adapted_proposal import adapted_proposal, effective_share
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
     BodyDraws,
@@ -34,7 +35,7 @@ from bayesid.inference.collapsed_proposal import collapsed_proposal
 from bayesid.inference.ensemble import Chains
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
-from bayesid.inference.parameterisation import LinearParameterisation
+from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import identified_robot
 from bayesid.inference.posterior_file import to_arviz
@@ -51,6 +52,9 @@ __all__ = ["EffectQuantity", "Identification", "StartState", "identify"]
 
 NEARLY_NORMAL = 0.3
 """Share of effective samples of importance sampling below which a better proposal than the Student-t is sought."""
+
+WORTHLESS = 0.02
+"""Share of effective draws below which the proposal of the linearised likelihood is not used."""
 
 PRIOR_DRAWS = 4000
 """Number of draws from the prior that give its widths, for the comparison with the posterior."""
@@ -442,14 +446,20 @@ def identify(
     parameterisation = choose_parameterisation(refined, optimum, rng)
     evidence = importance_sample(parameterisation, optimum, rng)
     began = time.perf_counter()
-    proposal = None
+    nearly = parameterisation.proposal(optimum)
+    target = SamplingTarget(refined, optimum, parameterisation, nearly, evidence.trusted)
     if evidence.effective_samples < NEARLY_NORMAL * evidence.evaluations:
+        progress(0.0, "looking for a proposal")
+        linear = LinearParameterisation(refined)
         proposal = collapsed_proposal(refined, optimum, rng, effective_samples)
-    if proposal is None:
-        nearly = parameterisation.proposal(optimum)
-        target = SamplingTarget(refined, optimum, parameterisation, nearly, evidence.trusted)
-    else:
-        target = SamplingTarget(refined, optimum, LinearParameterisation(refined), proposal, True)
+        if proposal is not None and effective_share(linear, proposal, rng) < WORTHLESS:
+            proposal = None
+        if proposal is not None:
+            target = SamplingTarget(refined, optimum, linear, proposal, True)
+        elif not evidence.trusted:
+            simple = LogCholeskyParameterisation(refined)
+            adapted = adapted_proposal(simple, optimum, rng)
+            target = target if adapted is None else SamplingTarget(refined, optimum, simple, adapted, True)
     chosen: Sampler = Emcee(max_steps, file) if sampler is None else sampler
     drawn = chosen.sample(
         target, np.random.default_rng(walkers), effective_samples=effective_samples, progress=progress

@@ -8,7 +8,8 @@ differentiate the simulation along it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
@@ -18,8 +19,9 @@ from bayesid._math.on_device import on_device
 from bayesid._math.resampling import hermite
 from bayesid._math.runge_kutta import STAGE_TIMES, TABLEAU
 from bayesid.inference import compiled
-from bayesid.inference.compiled import Arrays, Perturbation, Traced, perturbed
+from bayesid.inference.compiled import Arrays, Numbers, Perturbation, Structure, Traced, perturbed
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.unknowns import part_of_prior
 from bayesid.robot.composite_tables import WIDTH
 from bayesid.simulation.dynamics import LinearMotion
 
@@ -79,8 +81,9 @@ class LinearResponses:
 
     Attributes
     ----------
-    posterior : Posterior
-        Without joint torques among its data.
+    structure : Structure
+        Without joint torques.
+    numbers : Numbers
     z : (size,) array
         Coordinates.
     arrays : Arrays
@@ -89,7 +92,8 @@ class LinearResponses:
         Derivatives of the simulation there, leading axis R.
     """
 
-    posterior: Posterior
+    structure: Structure
+    numbers: Numbers
     z: Floats
     arrays: Arrays
     motion: LinearMotion
@@ -107,7 +111,22 @@ class LinearResponses:
             Data, which may be `perturbed`.
         """
         motion = compiled.linearised(posterior.structure, posterior.numbers, on_device(z), arrays)
-        return cls(posterior, z, arrays, jax.tree.map(np.asarray, motion))
+        return cls(posterior.structure, posterior.numbers, z, arrays, jax.tree.map(np.asarray, motion))
+
+    def part(self, recordings: Sequence[int]) -> LinearResponses:
+        """Return the responses of some of the recordings, which are independent given the unknowns.
+
+        Parameters
+        ----------
+        recordings : sequence of int
+            Numbers of the recordings, in increasing order.
+        """
+        whole, rows = self.structure.layout, np.asarray(recordings)
+        layout, coordinates = whole.part(recordings)
+        arrays, motion = jax.tree.map(lambda x: np.asarray(x)[rows], (self.arrays, self.motion))
+        numbers = self.numbers._replace(prior=part_of_prior(whole, self.numbers.prior, recordings))
+        structure = replace(self.structure, layout=layout)
+        return LinearResponses(structure, numbers, self.z[coordinates], jax.tree.map(on_device, arrays), motion)
 
     def along(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
@@ -118,9 +137,10 @@ class LinearResponses:
             raw, offset = self._raw(batch), batch.reading
             missing = BATCH - len(offset)
             padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in (raw, offset)]
-            at = (self.posterior.structure, self.posterior.numbers, on_device(self.z), self.arrays)
+            at = (self.structure, self.numbers, on_device(self.z), self.arrays)
             parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: len(offset)])
-        return np.concatenate(parts) if parts else np.zeros((0, *self.posterior.residual_shape))
+        shape = (len(self.arrays.start), self.arrays.start.shape[1], self.arrays.weights.shape[2])
+        return np.concatenate(parts) if parts else np.zeros((0, *shape))
 
     def _raw(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the raw readings, shape (n, R, T, q)."""

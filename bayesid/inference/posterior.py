@@ -22,6 +22,7 @@ from bayesid.inference.compiled import Numbers, Structure
 from bayesid.inference.data import Data, RecordedSamples, grids_of, stacked
 from bayesid.inference.encoder_noise import SampledMotion
 from bayesid.inference.integration_step import choose_step, simulate_padded
+from bayesid.inference.memory_estimate import refuse_large_recordings
 from bayesid.inference.unknowns import Unknowns
 from bayesid.inference.whitening import Whitening
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -90,14 +91,15 @@ class Posterior:
         Raises
         ------
         InputError
-            If there is no recording, one lacks a sensor that the model declares, or a hook of an effect of the user's
-            own breaks its contract.
+            If there is no recording, one lacks a sensor that the model declares, a hook of an effect of the user's own
+            breaks its contract, or memory is lacking.
         """
         for effect in model.effects:
             check_own_effect(effect, model.robot, model.sensors)
         if not manoeuvres:
             raise InputError("there is no recording", remedy="Give at least one")
         recorded = tuple(RecordedSamples.of(model, manoeuvre) for manoeuvre in manoeuvres)
+        refuse_large_recordings(model, recorded)
         unknowns = _unknowns(model, manoeuvres, recorded)
         numbers, structure = _numbers(model, unknowns), _structure(model, unknowns)
         start = starting_point(unknowns, recorded)

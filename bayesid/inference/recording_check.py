@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
@@ -17,7 +18,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind
 
-__all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording"]
+__all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "check_recordings"]
 
 
 STILL = 1e-3
@@ -185,6 +186,22 @@ class RecordingCheck:
         return tuple(sentences)
 
 
+def check_recordings(posterior: Posterior, progress: Progress = silent) -> list[RecordingCheck]:
+    """Check all recordings of a posterior against the readings that the prior's centre predicts.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    progress : Progress, optional
+    """
+    checks = []
+    for index, predicted in enumerate(readings_at_start(posterior)):
+        name = posterior.manoeuvres[index].recording.name
+        progress(index / len(posterior.manoeuvres), f"checking {name}")
+        checks.append(_check(posterior, index, predicted))
+    return checks
+
+
 def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
     """Check one recording of a posterior against the readings that the prior's centre predicts.
 
@@ -194,9 +211,12 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
     index : int
         Number of the recording.
     """
+    return _check(posterior, index, readings_at_start(posterior)[index])
+
+
+def _check(posterior: Posterior, index: int, predicted: PredictedReadings) -> RecordingCheck:
     manoeuvre, model = posterior.manoeuvres[index], posterior.model
     recording = manoeuvre.recording
-    predicted = readings_at_start(posterior)[index]
     return RecordingCheck(
         name=recording.name,
         duration=float(recording.time[-1] - recording.time[0]),

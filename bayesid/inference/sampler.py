@@ -12,7 +12,7 @@ from emcee.backends import HDFBackend
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
-from bayesid.inference.ensemble import ENSEMBLES, R_HAT, Chains, Proposal, sample
+from bayesid.inference.ensemble import ENSEMBLES, MOST_SECONDS, R_HAT, Chains, Proposal, sample
 from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import LogCholeskyParameterisation, Parameterisation
 from bayesid.inference.posterior import Posterior
@@ -99,10 +99,13 @@ class Emcee:
     file : path or emcee.backends.HDFBackend, optional
         File in emcee's format that keeps every step, in groups ``ensemble-0`` to ``ensemble-3``, or of the backend's
         name and the same numbers; a run that was interrupted goes on from there.
+    max_seconds : float
+        Time after which it stops at the next test of convergence, converged or not [s].
     """
 
     max_steps: int = 5000
     file: str | Path | HDFBackend | None = None
+    max_seconds: float = MOST_SECONDS
 
     def sample(
         self,
@@ -122,6 +125,7 @@ class Emcee:
             seed,
             effective_samples=effective_samples,
             max_steps=self.max_steps,
+            max_seconds=self.max_seconds,
             trusted=target.trusted,
             proposal=target.proposal,
             file=self.file,

@@ -10,7 +10,7 @@ width of the prior needs no new compilation.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid._math.arrays import Floats, Traceable
+from bayesid._math.arrays import Floats, Integers, Traceable
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
 from bayesid.robot.body_prior import BodyPrior, Mixing, coordinates_of
@@ -37,7 +37,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Prior
 from bayesid.simulation.simulator import Values
 
-__all__ = ["EffectLayout", "Layout", "PriorNumbers", "Unknowns"]
+__all__ = ["EffectLayout", "Layout", "PriorNumbers", "Unknowns", "part_of_prior"]
 
 MAPPED = 256
 """Number of points that are mapped together, so that one compilation serves any number of points."""
@@ -254,6 +254,21 @@ def _inertial_slope(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
     return jax.jacfwd(lambda z: layout.values(numbers, z).inertial)(z)
 
 
+def part_of_prior(layout: Layout, numbers: PriorNumbers, recordings: Sequence[int]) -> PriorNumbers:
+    """Return the numbers of the prior of some of the recordings.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of all recordings.
+    numbers : PriorNumbers
+    recordings : sequence of int
+        Numbers of the recordings, in increasing order.
+    """
+    tilts = [place for place, recording in enumerate(layout.tilts) if recording in recordings]
+    return numbers._replace(tilt=np.asarray(numbers.tilt)[tilts], speed=np.asarray(numbers.speed)[list(recordings)])
+
+
 class EffectLayout(NamedTuple):
     """Layout of one effect.
 
@@ -370,6 +385,57 @@ class Layout:
     def size(self) -> int:
         """Number of coordinates."""
         return self.all_speeds.stop + sum(self._count(effect) for effect in self.effects)
+
+    @cached_property
+    def owner(self) -> Integers:
+        """Recording in which each coordinate acts alone, -1 for those that act in all, shape (size,)."""
+        owner, recordings = np.full(self.size, -1), np.arange(self.recordings)
+        owner[self.all_rates] = np.repeat(recordings, 3)[: self.all_rates.stop - self.all_rates.start]
+        owner[self.all_tilts] = np.repeat(self.tilts, 3)
+        owner[self.all_speeds] = np.repeat(recordings, self.joints)
+        for index, effect in enumerate(self.effects):
+            if effect.per_recording:
+                owner[self.effect(index)] = np.repeat(recordings, len(effect.priors))
+        return owner
+
+    @cached_property
+    def packed(self) -> Integers:
+        """Column of each coordinate where those that act alone in different recordings share columns, shape (size,).
+
+        The derivatives of R recordings then take as many columns as those of one.
+        """
+        column = np.zeros(self.size, dtype=int)
+        shared = np.flatnonzero(self.owner < 0)
+        column[shared] = np.arange(len(shared))
+        for recording in range(self.recordings):
+            alone = np.flatnonzero(self.owner == recording)
+            column[alone] = len(shared) + np.arange(len(alone))
+        return column
+
+    def part(self, recordings: Sequence[int]) -> tuple[Layout, Integers]:
+        """Return the layout of some of the recordings, and the indices of its coordinates among these.
+
+        Parameters
+        ----------
+        recordings : sequence of int
+            Numbers of the recordings, in increasing order.
+        """
+        tilts = tuple(place for place, recording in enumerate(recordings) if recording in self.tilts)
+        indices = np.flatnonzero((self.owner < 0) | np.isin(self.owner, recordings))
+        return replace(self, recordings=len(recordings), tilts=tilts), indices
+
+    def unpacked(self, packed: Floats) -> Floats:
+        """Return derivatives in all coordinates, (size, R, ...), from those in packed columns, (columns, R, ...).
+
+        Parameters
+        ----------
+        packed : (columns, R, ...) array
+        """
+        whole = np.zeros((self.size, *packed.shape[1:]))
+        for place, (column, owner) in enumerate(zip(self.packed, self.owner, strict=True)):
+            part = slice(None) if owner < 0 else owner
+            whole[place, part] = packed[column, part]
+        return whole
 
     def _count(self, effect: EffectLayout) -> int:
         return len(effect.priors) * (self.recordings if effect.per_recording else 1)

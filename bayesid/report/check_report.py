@@ -17,6 +17,7 @@ from bayesid.report.numbers import format_fixed, format_number, format_unit
 
 __all__ = ["check_report"]
 
+DRAWN = 12  # most recordings that are shown in full
 
 def check_report(
     posterior: Posterior,
@@ -65,7 +66,14 @@ def check_report(
         "inertia.",
     )
     fits = sensor_fits(posterior, posterior.starting_point())
-    for index, check in enumerate(checks):
+    drawn = drawn_recordings(checks)
+    if len(drawn) < len(checks):
+        document.paragraph(
+            f"{counted(len(drawn), 'recording')} are shown in full, those with the most remarks; check.json holds "
+            "the figures of all."
+        )
+    for index in drawn:
+        check = checks[index]
         _add_recording(document, posterior, index, check)
         document.figure(
             figures.measured_against_simulated(fits[index]),
@@ -73,6 +81,12 @@ def check_report(
             "until the unknown bodies are identified.",
         )
     document.write(file)
+
+
+def drawn_recordings(checks: Sequence[RecordingCheck]) -> list[int]:
+    """Return the recordings that a report shows in full: those with the most remarks, in their order."""
+    ranked = sorted(range(len(checks)), key=lambda index: (-len(checks[index].warnings), index))
+    return sorted(ranked[:DRAWN])
 
 
 def _add_recording(document: Document, posterior: Posterior, index: int, check: RecordingCheck) -> None:

@@ -17,7 +17,7 @@ from studies.benchmark.run import EVALUATED
 from studies.common.provenance import MODELS, processor
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
-from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, Cost, middle, run
+from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, MANY, Cost, Run, middle, run
 from studies.cost.search_times import SearchTimes
 
 MEMORY = 1.5  # largest wanted memory of a diagnosis [GB]
@@ -54,7 +54,20 @@ def goals_of(cost: Cost) -> list[Goal]:
             walls = [run.wall for run in cost.commands[name][1:]]
             text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"
             goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
-    return goals + _search_goals(cost.search)
+    return goals + _many_goals(cost.many) + _search_goals(cost.search)
+
+
+def _many_goals(many: Mapping[str, list[Run]]) -> list[Goal]:
+    """Return the goals of what was run on many recordings."""
+    goals = []
+    for row in MANY:
+        if row.title in many:
+            warm = many[row.title][-1]
+            seconds = warm.to_verdict if row.command == "diagnose" else warm.wall
+            text = f"{row.title}, compiled code kept: at most {row.seconds:g} s and {row.memory:g} GB"
+            reached = f"{seconds:.0f} s, {format_number(warm.memory, 2)} GB"
+            goals.append(Goal(text, reached, Verdict.of(seconds <= row.seconds and warm.memory <= row.memory)))
+    return goals
 
 
 def _search_goals(search: SearchTimes | None) -> list[Goal]:
@@ -144,7 +157,7 @@ def _runs(cost: Cost) -> CsvTable:
     rows = [
         [kind, name, number, "cold" if number == 0 else "warm", run.wall, run.processor, run.memory]
         + [run.phases.get(phase, "") for phase in names]
-        for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands))
+        for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands), ("many", cost.many))
         for name, runs in group.items()
         for number, run in enumerate(runs)
     ]

@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -54,6 +54,29 @@ DIAGNOSES = (
     Diagnosed("swinging torque", "swinging-torque", 10.0, 40.0),
 )
 
+
+class Many(NamedTuple):
+    """A diagnosis, or a check, of many recordings that is timed."""
+
+    command: str
+    recordings: int  # of 160 s at 2 Hz
+    # longest wanted time to the verdict, or of the check, with compiled code kept [s], and largest wanted memory [GB]
+    seconds: float
+    memory: float
+
+    @property
+    def title(self) -> str:
+        """Command and number of recordings."""
+        return f"{self.command}, {self.recordings} recordings"
+
+
+MANY = (
+    Many("check", 40, 15.0, 2.0),
+    Many("diagnose", 40, 45.0, 2.0),
+    Many("check", 200, 60.0, 2.0),
+    Many("diagnose", 200, 240.0, 2.0),
+)
+
 # other commands, and the longest wanted time with compiled code kept, from files to report [s]
 COMMANDS = {"check": None, "identify": 20.0, "identifiability": 30.0, "design": 120.0}
 
@@ -62,6 +85,15 @@ def write_case(name: str, folder: Path) -> Path:
     """Write the files of a case, three recordings of 140 to 160 s, and return the study's."""
     number = next(k for k, case in enumerate(hidden_causes.CASES) if case.name == name)
     return hidden_causes.CASES[number].make(folder, FIRST_SEED + number)
+
+
+def write_many(recordings: int, folder: Path) -> Path:
+    """Write the files of many recordings of 160 s at 2 Hz with a hidden wheel, and return the study's."""
+    case = next(case for case in hidden_causes.CASES if case.name == "wheel-momentum")
+    flown = {"count": recordings, "duration": 160.0}
+    latitudes = np.random.default_rng(FIRST_SEED).uniform(0.0, 2.0 * np.pi, recordings).tolist()
+    fixed = {**case.fixed, "manoeuvres": flown, "latitudes": latitudes}
+    return replace(case, fixed=fixed).make(folder, FIRST_SEED + 100)
 
 
 PROGRAM = "from bayesid.app.command_line import main; main()"
@@ -264,6 +296,7 @@ class Cost:
     sampled: dict[str, Run]  # diagnoses with 4,000 effective samples of the extended model, compiled code kept
     # other commands on the recordings with nothing hidden, the first run of each without compiled code
     commands: dict[str, list[Run]]
+    many: dict[str, list[Run]]  # checks and diagnoses of many recordings, the first run of each without compiled code
     candidates: dict[int, float]  # time of a verdict by the number of candidates [s]
     growth: dict[str, dict[int, float]]  # time of one evaluation by what grows [s]
     floor: Floor
@@ -279,6 +312,7 @@ def run(
     seed: int = 0,
     titles: tuple[str, ...] = TITLES,
     commands: tuple[str, ...] = tuple(COMMANDS),
+    many: tuple[Many, ...] = MANY,
     before: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Cost:
@@ -289,6 +323,7 @@ def run(
     full : bool; whether to repeat, to sample, and to run the nested sampler up to ten minutes rather than ten seconds
     seed : int; seed of the nested sampler
     titles, commands : tuple of str; diagnoses and other commands to time
+    many : tuple of Many; runs on many recordings, which only a full study makes
     before : Path, optional; times that an earlier run wrote, to compare with
     progress : callable, optional; receives a line before each part
     """
@@ -317,6 +352,12 @@ def run(
             name: timed(name, (name,), files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
         }
+        on_many = {}
+        for row in many if full else ():
+            file = place / f"many-{row.recordings}" / "study.toml"
+            file = file if file.is_file() else write_many(row.recordings, file.parent)
+            words = ("diagnose", "--no-sample", "--no-fly-next") if row.command == "diagnose" else (row.command,)
+            on_many[row.title] = timed(row.title, words, file, 2, place / "cache-many")
         progress("search for manoeuvres")
         search = search_times(place / "cache-search") if full else None
         progress("candidates and nested sampling")
@@ -329,7 +370,7 @@ def run(
     progress("growth of one evaluation")
     grown = growth(20) if full else growth(2, sizes=1)
     floor = floor_of(20 if full else 2)
-    return Cost(diagnoses, sampled, others, by_candidates, grown, floor, one, search, full, before)
+    return Cost(diagnoses, sampled, others, on_many, by_candidates, grown, floor, one, search, full, before)
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:

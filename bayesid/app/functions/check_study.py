@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from bayesid._io.progress import Progress, part_of, silent
 from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.conventions import find_conventions
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.recording_check import RecordingCheck, check_recording
+from bayesid.inference.recording_check import RecordingCheck, check_recordings
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.convention import Convention
 
@@ -58,12 +59,13 @@ class StudyCheck(ShortForm):
         }
 
 
-def check(study: StudySource | Posterior) -> StudyCheck:
+def check(study: StudySource | Posterior, *, progress: Progress = silent) -> StudyCheck:
     """Check a study and its recordings: rates, gaps, noise, clocks, joints that hardly move.
 
     Parameters
     ----------
     study : path, Study or Posterior
+    progress : Progress, optional
 
     Raises
     ------
@@ -75,13 +77,13 @@ def check(study: StudySource | Posterior) -> StudyCheck:
         posterior, conventions = study, find_conventions(study.model, study.manoeuvres)
     else:
         model = load_model(study)
-        manoeuvres = load_manoeuvres(study, model.robot)
+        manoeuvres = load_manoeuvres(study, model.robot, part_of(progress, 0.0, 0.7))
         conventions = find_conventions(model, manoeuvres)
         # nothing is fitted: the samples' correlations do not matter
         posterior = Posterior.of(model, manoeuvres, window=0)
         if not conventions:
             refuse_wrong_units(posterior)
-    checks = tuple(check_recording(posterior, index) for index in range(len(posterior.manoeuvres)))
+    checks = tuple(check_recordings(posterior, part_of(progress, 0.8, 1.0)))
     return StudyCheck("" if isinstance(study, Posterior) else study.title, posterior, checks, tuple(conventions))
 
 

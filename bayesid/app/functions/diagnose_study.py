@@ -84,7 +84,8 @@ def diagnose(
     else:
         whole = study_of(study)
         model = load_model(whole)
-        manoeuvres = load_manoeuvres(whole, model.robot) if manoeuvres is None else manoeuvres
+        reading = part_of(progress, 0.0, 0.05)
+        manoeuvres = load_manoeuvres(whole, model.robot, reading) if manoeuvres is None else manoeuvres
         knows_latitude = all(section.argument_of_latitude is not None for section in whole.recordings)
         bounds, prior = bounds or stated_bounds(whole), prior or cause_prior(whole)
     result = diagnose_motion(

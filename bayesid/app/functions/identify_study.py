@@ -7,7 +7,7 @@ from pathlib import Path
 from emcee.backends import HDFBackend
 
 from bayesid._io.errors import InputError
-from bayesid._io.progress import Progress, silent
+from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
 from bayesid.app.functions.study_source import StudySource, recorded_posterior
 from bayesid.inference import identification
@@ -54,7 +54,7 @@ def identify(
     InputError
         If the study is wrong, nothing is unknown, or no value of the unknowns comes near the data.
     """
-    posterior = recorded_posterior(study)
+    posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
     if not posterior.size:
         raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
     return identification.identify(

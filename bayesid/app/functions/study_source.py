@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bayesid._io.progress import Progress, silent
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_posterior
 from bayesid.inference.posterior import Posterior
@@ -20,7 +21,9 @@ def study_of(source: StudySource) -> Study:
     return source if isinstance(source, Study) else Study.load(source)
 
 
-def recorded_posterior(source: StudySource | Posterior, window: int | None = None) -> Posterior:
+def recorded_posterior(
+    source: StudySource | Posterior, window: int | None = None, progress: Progress = silent
+) -> Posterior:
     """Return the posterior of a study's recordings, whose units are checked; a posterior is returned as it is.
 
     Parameters
@@ -28,9 +31,11 @@ def recorded_posterior(source: StudySource | Posterior, window: int | None = Non
     source : Study, path or Posterior
     window : int, optional
         As for `Posterior.of`.
+    progress : Progress, optional
+        Receiver of the share of the recordings that is read.
     """
     if isinstance(source, Posterior):
         return source
-    posterior = load_posterior(study_of(source), window=window)
+    posterior = load_posterior(study_of(source), window, progress)
     refuse_wrong_units(posterior)
     return posterior

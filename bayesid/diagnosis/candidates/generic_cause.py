@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,12 +11,26 @@ from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
 from bayesid.diagnosis.candidates.linear_model import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.settings import FULL
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.residual_view import ResidualView, by_recording
+from bayesid.inference.residual_view import ResidualView
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["FORCE", "TORQUE", "WAVES", "GenericCause", "burst_signatures", "error_signatures", "generic_signatures"]
+__all__ = [
+    "FEW",
+    "FORCE",
+    "TORQUE",
+    "WAVES",
+    "GenericCause",
+    "burst_signatures",
+    "course_groups",
+    "error_signatures",
+    "generic_columns",
+    "generic_signatures",
+    "instants_of_each",
+    "smooth_signatures",
+]
 
 TORQUE, FORCE = "disturbing torque", "disturbing force"
 """Names of the smooth disturbances."""
@@ -26,6 +40,13 @@ WAVES = 40
 
 ERROR_WAVES = 40
 """Cosines in time of an error of a sensor, per channel and recording."""
+
+FEW = 3
+"""Of more than `FULL` recordings, those in which courses of all speeds are weighed, spread evenly over them; in all
+recordings only as many slow ones as these have fast ones together, so that the number of columns stays bounded."""
+
+TOGETHER = 24
+"""Courses whose responses are computed together."""
 
 CORNERS = (2.0, 7.0, 25.0)
 """Numbers of half waves in a recording up to which a smooth disturbance has its variance, equally probable."""
@@ -87,36 +108,102 @@ def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     - error of each sensor: smooth courses of its channels.
     """
     posterior = perturbed.posterior
-    kinds, size = posterior.model.channels.kinds, RobotSize.of(posterior.model.robot)
-    force = ACCELERATION * size.mass
-    torque = force * size.radius
+    kinds = posterior.model.channels.kinds
     banks = [
-        _smooth(perturbed, fit, TORQUE, 3, torque),
-        *([_smooth(perturbed, fit, FORCE, 0, force)] if any(kind.feels_force for kind in kinds) else []),
-        _pulses(perturbed, fit, torque),
+        smooth_signatures(perturbed, fit),
+        _pulses(perturbed, fit, _largest(posterior)[0]),
         *(error_signatures(posterior, f"error of {kind.value}", posterior.model.channels.of(kind)) for kind in kinds),
     ]
     return SignatureBank.joined(banks)
 
 
-def _smooth(perturbed: PerturbedModel, fit: Fit, name: str, first: int, high: float) -> SignatureBank:
-    """Return the bank of a smooth torque (first = 3) or force (0) in base axes."""
+def smooth_signatures(perturbed: PerturbedModel, fit: Fit, recordings: Sequence[int] | None = None) -> SignatureBank:
+    """Return the bank of a smooth torque, and of a smooth force where a sensor feels it.
 
-    def waves(time: Floats, end: float) -> Floats:
-        return np.cos(np.pi * np.arange(WAVES)[:, None] * time / end)
+    Parameters
+    ----------
+    perturbed : PerturbedModel
+    fit : Fit
+    recordings : sequence of int, optional
+        Numbers of those in which they act in full, by default as `course_groups` says.
+    """
+    posterior = perturbed.posterior
+    torque, force = _largest(posterior)
+    banks = []
+    for name, first, high in ((TORQUE, 3, torque), (FORCE, 0, force)):
+        if first or any(kind.feels_force for kind in posterior.model.channels.kinds):
+            groups = course_groups(name, len(posterior.manoeuvres), WAVES)
+            chosen = groups if recordings is None else [(name, list(recordings), WAVES)]
+            banks.append(_smooth(perturbed, fit, chosen, first, high))
+    return SignatureBank.joined(banks)
 
-    columns = _wrenches(perturbed, fit, WAVES, waves, first)
-    recordings = len(columns)
-    signatures = tuple(Signatures(name, own, r) for r, own in enumerate(columns))
-    spreads = [np.tile(np.repeat(own, 3), recordings) for own in _courses(WAVES)]
-    return SignatureBank(signatures, (_cause(name, high, spreads),))
+
+def generic_columns(posterior: Posterior) -> int:
+    """Return the number of columns of `generic_signatures`.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    """
+    recordings, kinds = len(posterior.manoeuvres), posterior.model.channels.kinds
+    courses = sum(len(chosen) * count for _, chosen, count in course_groups("", recordings, WAVES))
+    wrenches = 6 if any(kind.feels_force for kind in kinds) else 3
+    return courses * (wrenches + posterior.model.channels.count) + 3 * recordings * instants_of_each(
+        INSTANTS, recordings
+    )
 
 
-def _cause(name: str, high: float, spreads: Sequence[Floats]) -> CandidateCause:
-    """Return the candidate with one form for each course, corners and bands with half of the prior each."""
-    forms = [(AmplitudeGroup(name, high, spread=own),) for own in spreads]
-    bands = len(forms) - len(CORNERS)
-    shares = [(0.5 if bands else 1.0) / len(CORNERS)] * len(CORNERS) + [0.5 / max(bands, 1)] * bands
+def _largest(posterior: Posterior) -> tuple[float, float]:
+    """Return the largest torque [N m] and force [N]."""
+    size = RobotSize.of(posterior.model.robot)
+    return ACCELERATION * size.mass * size.radius, ACCELERATION * size.mass
+
+
+def _smooth(
+    perturbed: PerturbedModel, fit: Fit, groups: Sequence[tuple[str, list[int], int]], first: int, high: float
+) -> SignatureBank:
+    """Return the bank of a smooth torque (first = 3) or force (0) in base axes, in groups of courses."""
+
+    def waves(number: Integers, time: Floats, end: float) -> Floats:
+        return np.cos(np.pi * number[:, None] * time / end)
+
+    signatures: list[Signatures] = []
+    spreads: dict[str, list[Floats]] = {}
+    for group, chosen, count in groups:
+        columns = _wrenches(perturbed, fit, count, waves, first, chosen)
+        signatures += [Signatures(group, part, r) for r, part in zip(chosen, columns, strict=True)]
+        spreads[group] = [np.tile(np.repeat(course, 3), len(chosen)) for course in _courses(count)]
+    return SignatureBank(tuple(signatures), (_cause(groups[0][0], high, spreads),))
+
+
+def course_groups(name: str, recordings: int, waves: int) -> list[tuple[str, list[int], int]]:
+    """Return the groups of smooth courses of a candidate: name, recordings that have them, number of cosines in each.
+
+    Parameters
+    ----------
+    name : str
+        Name of the candidate.
+    recordings, waves : int
+        Number of recordings, and of cosines in one that is weighed in full.
+    """
+    every = list(range(recordings))
+    if recordings <= FULL:
+        return [(name, every, waves)]
+    spread = [(2 * k + 1) * recordings // (2 * FEW) for k in range(FEW)]
+    return [(name, every, max(waves * FEW // recordings, 1)), (f"{name}, fast", spread, waves)]
+
+
+def _cause(name: str, high: float, spreads: Mapping[str, Sequence[Floats]]) -> CandidateCause:
+    """Return the candidate with one form for each course of its groups, corners and bands with half of the prior each.
+
+    Groups have equal parts of the prior.
+    """
+    forms, shares = [], list[float]()
+    for group, courses in spreads.items():
+        forms += [(AmplitudeGroup(group, high, spread=course),) for course in courses]
+        bands = len(courses) - len(CORNERS)
+        each = [(0.5 if bands else 1.0) / len(CORNERS)] * len(CORNERS) + [0.5 / max(bands, 1)] * bands
+        shares += [share / len(spreads) for share in each]
     return CandidateCause(name, forms[0], True, tuple(forms[1:]), tuple(shares))
 
 
@@ -133,41 +220,66 @@ def _courses(waves: int) -> list[Floats]:
 
 def _pulses(perturbed: PerturbedModel, fit: Fit, high: float) -> SignatureBank:
     """Return the bank of one pulse of torque at an instant of a recording."""
+    recordings = len(perturbed.posterior.manoeuvres)
+    instants = instants_of_each(INSTANTS, recordings)
 
-    def pulses(time: Floats, end: float) -> Floats:
-        centres = end * (np.arange(INSTANTS)[:, None] + 0.5) / INSTANTS
-        return np.maximum(1.0 - np.abs(time - centres) * INSTANTS / end, 0.0)
+    def pulses(number: Integers, time: Floats, end: float) -> Floats:
+        centres = end * (number[:, None] + 0.5) / instants
+        return np.maximum(1.0 - np.abs(time - centres) * instants / end, 0.0)
 
     signatures = []
-    for r, columns in enumerate(_wrenches(perturbed, fit, INSTANTS, pulses, 3)):
-        for k in range(INSTANTS):
+    for r, columns in enumerate(_wrenches(perturbed, fit, instants, pulses, 3, range(recordings))):
+        for k in range(instants):
             name = f"pulse of torque {k + 1} of recording {r + 1}"
             signatures.append(Signatures(name, columns[:, 3 * k : 3 * k + 3], r))
     forms = [(AmplitudeGroup(item.name, high),) for item in signatures]
     return SignatureBank(tuple(signatures), (CandidateCause("pulse of torque", forms[0], True, tuple(forms[1:])),))
 
 
+def instants_of_each(instants: int, recordings: int) -> int:
+    """Return the instants in each recording: those of one that is weighed in full, or fewer where there are many.
+
+    Parameters
+    ----------
+    instants, recordings : int
+        Number of instants of a recording that is weighed in full, and of recordings.
+    """
+    return instants if recordings <= FULL else max(instants * FULL // recordings, 1)
+
+
 def _wrenches(
-    perturbed: PerturbedModel, fit: Fit, count: int, courses: Callable[[Floats, float], Floats], first: int
+    perturbed: PerturbedModel,
+    fit: Fit,
+    count: int,
+    courses: Callable[[Integers, Floats, float], Floats],
+    first: int,
+    recordings: Sequence[int],
 ) -> list[Floats]:
-    """Return the responses of each recording to ``count`` courses in time of a torque or force: (rows, 3 count).
+    """Return the responses of some recordings to ``count`` courses in time of a torque or force: (rows, 3 count).
 
     The recordings are independent given the unknowns, so that one push acts on all of them at once.
     """
-    moments = (fit.operating.node, fit.operating.sample)
-    times = [np.asarray(instant.environment.time) for instant in moments]
-    wrenches = []
-    for instant, time in zip(moments, times, strict=True):
-        wrench = np.zeros((count, 3, *time.shape, 6))
-        for r, end in enumerate(times[0].max(axis=1)):
-            course = courses(time[r], float(end))
-            for axis in range(3):
-                wrench[:, axis, r, :, first + axis] = course
-        if first == 0:
-            wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
-        wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
-    push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    return list(by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
+    chosen = list(recordings)
+    moments = [(np.asarray(i.environment.time)[chosen], np.asarray(i.body.com)[chosen]) for i in fit.operating[1:3]]
+    ends = moments[0][0].max(axis=1)
+    parts = []
+    together = count if len(chosen) <= FULL else TOGETHER
+    for numbers in (np.arange(start, min(start + together, count)) for start in range(0, count, together)):
+        wrenches = []
+        for time, com in moments:
+            wrench = np.zeros((len(numbers), 3, *time.shape, 6))
+            for r, end in enumerate(ends):
+                course = courses(numbers, time[r], float(end))
+                for axis in range(3):
+                    wrench[:, axis, r, :, first + axis] = course
+            if first == 0:
+                wrench[..., 3:] = np.cross(com, wrench[..., :3])
+            wrenches.append(wrench.reshape(3 * len(numbers), *time.shape, 6))
+        given = {"node_wrench": wrenches[0], "sample_wrench": wrenches[1]}
+        push = perturbed.perturbation(3 * len(numbers), len(chosen), **given)
+        responses = perturbed.respond(push, fit.z, fit.data, chosen)
+        parts.append(responses.reshape(len(chosen), -1, responses.shape[1]))
+    return list(np.concatenate(parts, axis=2))
 
 
 def error_signatures(posterior: Posterior, name: str, channels: slice) -> SignatureBank:
@@ -182,20 +294,23 @@ def error_signatures(posterior: Posterior, name: str, channels: slice) -> Signat
         Columns of the residual, which have one variance.
     """
     _, outputs, width = posterior.residual_shape
-    signatures, waves = [], []
-    for r, item in enumerate(posterior.whitenings):
-        for channel in range(channels.start, channels.stop):
-            there = np.flatnonzero(item.outputs[:, channel])
-            waves.append(min(ERROR_WAVES, len(there) // 3))
-            own = np.zeros((outputs, width, waves[-1]))
-            place = (np.arange(len(there)) + 0.5) / max(len(there), 1)
-            own[there, channel] = np.cos(np.pi * np.arange(waves[-1]) * place[:, None])
-            signatures.append(Signatures(name, own.reshape(outputs * width, -1), r))
-    if not sum(waves):
-        return SignatureBank()
-    each = [_courses(count) for count in waves if count]
-    spreads = [np.concatenate(parts) for parts in zip(*each, strict=False)]  # bands that all channels can show
-    return SignatureBank(tuple(signatures), (_cause(name, ERROR, spreads),))
+    signatures: list[Signatures] = []
+    spreads: dict[str, list[Floats]] = {}
+    for group, chosen, most in course_groups(name, len(posterior.whitenings), ERROR_WAVES):
+        waves = []
+        for r in chosen:
+            outputs_of = posterior.whitenings[r].outputs
+            for channel in range(channels.start, channels.stop):
+                there = np.flatnonzero(outputs_of[:, channel])
+                waves.append(min(most, len(there) // 3))
+                cosines = np.zeros((outputs, width, waves[-1]))
+                place = (np.arange(len(there)) + 0.5) / max(len(there), 1)
+                cosines[there, channel] = np.cos(np.pi * np.arange(waves[-1]) * place[:, None])
+                signatures.append(Signatures(group, cosines.reshape(outputs * width, -1), r))
+        each = [_courses(count) for count in waves if count]
+        if each:  # bands that all channels can show
+            spreads[group] = [np.concatenate(parts) for parts in zip(*each, strict=False)]
+    return SignatureBank(tuple(signatures), (_cause(name, ERROR, spreads),)) if spreads else SignatureBank()
 
 
 def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:

@@ -16,6 +16,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseAmplitude, CauseKind
+from bayesid.diagnosis.candidates.generic_cause import instants_of_each
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank, Signatures
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.gram import Gram
@@ -178,11 +179,11 @@ class InstantCause(CauseKind):
         ends = np.asarray(point.fit.operating.sample.environment.time).max(axis=1)
         intervals = sample_intervals(point.fit)
         finest = np.array([np.median(steps) for steps in intervals])
-        grid = np.stack([grid_instants(float(end)) for end in ends])
+        grid = _grid(point.fit)
         size, spread = _spread(effect, bounds)
         group = AmplitudeGroup(effect.label, size, spread=spread)
         chosen: list[float | None] = [None] * len(ends)
-        reach = np.array([float(row[1] - row[0]) for row in grid])
+        reach = ends / grid.shape[1]
         choices = [list(map(float, row)) for row in grid]
         while True:
             chosen = self._sought(point, effect, others, group, choices, chosen)
@@ -269,14 +270,22 @@ def _mean_and_sd(weight: Floats, times: Floats, interval: float) -> tuple[float,
     return mean, float(np.sqrt(weight @ (times - mean) ** 2 + interval**2 / 12.0))
 
 
-def grid_instants(end: float) -> Floats:
-    """Return the instants of the grid in a recording of some length [s]."""
-    return end * (np.arange(INSTANTS) + 0.5) / INSTANTS
+def grid_instants(end: float, count: int = INSTANTS) -> Floats:
+    """Return the instants of the grid in a recording of some length [s].
+
+    Parameters
+    ----------
+    end : float
+    count : int
+        Number of instants.
+    """
+    return end * (np.arange(count) + 0.5) / count
 
 
 def _grid(fit: Fit) -> Floats:
     """Return the grid of every recording, (R, K) [s]."""
-    return np.stack([grid_instants(float(end)) for end in np.asarray(fit.operating.node.environment.time).max(axis=1)])
+    ends = np.asarray(fit.operating.node.environment.time).max(axis=1)
+    return np.stack([grid_instants(float(end), instants_of_each(INSTANTS, len(ends))) for end in ends])
 
 
 def sample_intervals(fit: Fit) -> list[Floats]:

@@ -19,6 +19,7 @@ from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import with_bodies_held
+from bayesid.diagnosis.settings import FULL
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import rows_of
 
@@ -78,6 +79,11 @@ class SignatureBank:
             found = new | found
             causes += bank.causes
         return SignatureBank(tuple(item for items in found.values() for item in items), tuple(causes))
+
+    def without_columns(self) -> SignatureBank:
+        """Return the bank with the names, tones and instants of its signatures alone."""
+        bare = tuple(replace(item, columns=np.zeros((0, item.columns.shape[1]))) for item in self.signatures)
+        return SignatureBank(bare, self.causes)
 
 
 class Fitted(Protocol):
@@ -290,8 +296,12 @@ class Linearisation:
         return Linearisation.of(self.perturbed, self.fit, bank, self.present, self.bodies_fixed, self.far, self)
 
     def without_products(self) -> Linearisation:
-        """Return the linearisation without the products, which take as much memory as the Gram."""
-        return replace(self, products=None)
+        """Return the linearisation without the products, which take as much memory as the Gram.
+
+        With many recordings the columns go as well, unless other fits are to be made about the motion here.
+        """
+        many = len(self.fit.posterior.manoeuvres) > FULL and not self.far
+        return replace(self, products=None, bank=self.bank.without_columns() if many else self.bank)
 
     def with_bodies_fixed(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies fixed there."""

@@ -17,14 +17,16 @@ from scipy.linalg import block_diag
 
 from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats, Integers
-from bayesid.diagnosis.candidates.generic_cause import FORCE, TORQUE, WAVES
+from bayesid.diagnosis.candidates.generic_cause import FORCE, TORQUE, WAVES, smooth_signatures
 from bayesid.diagnosis.candidates.linear_model import SignatureBank
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken, torque_responses
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.fitted_set import Hypothesis
-from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, FULL, DiagnosisSettings
+from bayesid.inference.residual_view import by_recording, rows_of
 
 __all__ = ["DisturbingWrench", "Frame", "TorqueCorrelation", "disturbing_wrench", "torque_correlations"]
 
@@ -47,6 +49,10 @@ class DisturbingWrench:
     Attributes
     ----------
     signal_to_noise : float
+    names : tuple of str
+        Recordings in which it is reconstructed: all, or of many those with the largest residuals.
+    recordings : tuple of int
+        Their numbers.
     time : list of (S,) arrays
         Per recording [s].
     torque, force : dict of Frame to list of (S, 3) arrays
@@ -61,6 +67,7 @@ class DisturbingWrench:
 
     signal_to_noise: float
     names: tuple[str, ...]
+    recordings: tuple[int, ...]
     time: list[Floats]
     torque: dict[Frame, list[Floats]]
     force: dict[Frame, list[Floats]]
@@ -105,15 +112,20 @@ def disturbing_wrench(
         With the thresholds for naming these axes.
     """
     fit = hypothesis.fit
-    count = len(fit.posterior.manoeuvres)
-    times = np.asarray(fit.operating.node.environment.time)
-    rotations = _frames(hypothesis)
+    recordings = _reconstructed(fit)
+    count = len(recordings)
+    if count < len(fit.posterior.manoeuvres):
+        bank = smooth_signatures(hypothesis.perturbed, fit, recordings)
+    rows = np.concatenate([np.arange(len(fit.residual))[rows_of(fit.posterior, r)] for r in recordings])
+    times = np.asarray(fit.operating.node.environment.time)[recordings]
+    rotations = _frames(hypothesis, recordings)
     names = [name for name in (TORQUE, FORCE) if name in {cause.name for cause in bank.causes}]
-    parts = [_whole_columns(bank, name, count) for name in names]
+    parts = [_whole_columns(bank, name, recordings) for name in names]
     columns = np.concatenate(parts, axis=1)
     places = np.split(np.arange(columns.shape[1]), np.cumsum([part.shape[1] for part in parts])[:-1])
-    gram = Gram(fit.project(columns), columns.T @ fit.residual, dict(zip(names, places, strict=True)))
-    disturbance = _composed(hypothesis, gram, columns, [c for c in bank.causes if c.name in names], name_frame)
+    gram = Gram(fit.project(columns, rows), columns.T @ fit.residual[rows], dict(zip(names, places, strict=True)))
+    causes = [cause for cause in bank.causes if cause.name in names]
+    disturbance = _composed(hypothesis, gram, columns, causes, name_frame, recordings)
     smooth = disturbance.columns
     block = GaussianBlock.of(disturbance.matrix, disturbance.deviations)
     pull, posterior = block.share(disturbance.score), block.covariance
@@ -158,30 +170,37 @@ def disturbing_wrench(
 
     return DisturbingWrench(
         snr,
-        tuple(manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres),
+        tuple(fit.posterior.manoeuvres[r].recording.name for r in recordings),
+        tuple(recordings),
         [time[instants] for time, instants in zip(times, fresh, strict=True)],
         turned(torque),
         turned(force),
         list(torque_sd),
         list(force_sd),
-        _fixed_in(hypothesis, rotations, scale, settings) if name_frame and snr > 0.0 else None,
+        _fixed_in(hypothesis, rotations, scale, settings, recordings) if name_frame and snr > 0.0 else None,
         disturbance.log_evidence,
     )
+
+
+def _reconstructed(fit: Fit) -> list[int]:
+    """Return the recordings whose disturbance is reconstructed: all, or of many those with the largest residuals."""
+    energy = (by_recording(fit.posterior, fit.residual) ** 2).sum(axis=1)
+    return sorted(np.argsort(-energy, kind="stable")[:FULL].tolist())
 
 
 def _waves(time: Floats) -> Floats:
     return np.cos(np.pi * np.arange(WAVES)[:, None] * time / time[-1])
 
 
-def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
+def _frames(hypothesis: Hypothesis, recordings: Sequence[int]) -> dict[Frame, tuple[Floats, Floats]]:
     """Rotations from each frame to the base at stages (R, S, 3, 3) and samples (R, T, 3, 3)."""
     operating = hypothesis.fit.operating
     result: dict[Frame, list[Floats]] = {frame: [] for frame in Frame}
     for instant in (operating.node, operating.sample):
-        attitude = np.asarray(instant.attitude)  # base to orbit axes
+        attitude = np.asarray(instant.attitude)[recordings]  # base to orbit axes
         to_base = np.swapaxes(attitude, -1, -2)
-        zenith = np.asarray(instant.environment.zenith)
-        argument_of_latitude = np.asarray(instant.environment.argument_of_latitude)
+        zenith = np.asarray(instant.environment.zenith)[recordings]
+        argument_of_latitude = np.asarray(instant.environment.argument_of_latitude)[recordings]
         in_orbit = np.linalg.norm(zenith, axis=-1).min() > 0.5
         normal = np.zeros_like(zenith) + np.array([0.0, 0.0, 1.0])
         local, start = np.eye(3) + 0.0 * attitude, np.zeros((len(attitude), 1))
@@ -231,7 +250,12 @@ class _Composed:
 
 
 def _composed(
-    hypothesis: Hypothesis, gram: Gram, columns: Floats, causes: Sequence[CandidateCause], sudden: bool
+    hypothesis: Hypothesis,
+    gram: Gram,
+    columns: Floats,
+    causes: Sequence[CandidateCause],
+    sudden: bool,
+    recordings: Sequence[int],
 ) -> _Composed:
     """Return the most probable of a smooth disturbance, one with events beside it, and events with one beside them."""
     taken, deviations, log_evidence = _most_probable(gram, causes)
@@ -240,11 +264,11 @@ def _composed(
     largest = next((cause.groups[0].high for cause in causes if cause.name == TORQUE), 0.0)
     if not sudden or not largest:
         return smooth
-    candidates = EventCandidates.of(hypothesis, columns, largest)
+    candidates = EventCandidates.of(hypothesis, columns, largest, recordings)
     best = max(_options(gram, smooth, candidates, causes), key=lambda option: option.log_evidence)
     if best.chosen is None:
         return best
-    finer = EventCandidates.of(hypothesis, columns, largest, candidates.nearby(best.chosen))
+    finer = EventCandidates.of(hypothesis, columns, largest, recordings, candidates.nearby(best.chosen))
     known = slice(0, len(best.columns))
     block = GaussianBlock.of(best.matrix[known, known], best.deviations[known])
     beside = Taken(block.share(finer.shared[:, best.columns].T), block.share(best.score[known]))
@@ -307,22 +331,22 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
     return columns, deviations, total
 
 
-def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
-    """Return the columns of a group that acts in each recording by itself, (N, R k), zero in the others."""
+def _whole_columns(bank: SignatureBank, name: str, recordings: Sequence[int]) -> Floats:
+    """Return the columns of a group that acts in each of some recordings by itself, (n, r k), zero in the others."""
     parts = {signature.recording: signature.columns for signature in bank.signatures if signature.name == name}
-    return block_diag(*(parts[recording] for recording in range(recordings)))
+    return block_diag(*(parts[recording] for recording in recordings))
 
 
-def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
-    """Return the responses to cosines of a torque along the axes of frames, (N, R WAVES 3)."""
+def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats, recordings: Sequence[int]) -> Floats:
+    """Return the responses of some recordings to cosines of a torque along the axes of frames, (n, r WAVES 3)."""
     operating = hypothesis.fit.operating
-    ends = np.asarray(operating.node.environment.time).max(axis=1)
+    ends = np.asarray(operating.node.environment.time)[recordings].max(axis=1)
     torques = []
     for instant, axes in ((operating.node, frames), (operating.sample, samples)):
-        time = np.asarray(instant.environment.time)
+        time = np.asarray(instant.environment.time)[recordings]
         waves = np.cos(np.pi * np.arange(WAVES)[:, None, None] * time / ends[:, None])
         torques.append(np.einsum("krt,rtba->kartb", waves, axes).reshape(WAVES * 3, *time.shape, 3))
-    return block_diag(*torque_responses(hypothesis, *torques))
+    return block_diag(*torque_responses(hypothesis, *torques, recordings))
 
 
 def _fixed_in(
@@ -330,15 +354,17 @@ def _fixed_in(
     rotations: dict[Frame, tuple[Floats, Floats]],
     scale: float,
     settings: DiagnosisSettings,
+    recordings: Sequence[int],
 ) -> Frame | None:
     """Return the frame in which a torque of one direction, with a free course, explains most; None if undecided."""
     fit = hypothesis.fit
     explained = {}
     whole = 0.0
     orbit = float(np.linalg.norm(np.asarray(fit.operating.node.environment.zenith)[0, 0])) > 0.5
+    rows = np.concatenate([np.arange(len(fit.residual))[rows_of(fit.posterior, r)] for r in recordings])
     for frame in Frame if orbit else (Frame.BASE, Frame.INERTIAL):
-        columns = _responses(hypothesis, *rotations[frame])
-        gram, gradient = fit.project(columns), columns.T @ fit.residual
+        columns = _responses(hypothesis, *rotations[frame], recordings)
+        gram, gradient = fit.project(columns, rows), columns.T @ fit.residual[rows]
         courses = gram.shape[0] // 3
         gram = gram.reshape(courses, 3, courses, 3)
         gradient = gradient.reshape(courses, 3)
@@ -395,17 +421,18 @@ def torque_correlations(wrench: DisturbingWrench, hypothesis: Hypothesis) -> lis
 def _known_series(wrench: DisturbingWrench, hypothesis: Hypothesis) -> Iterator[tuple[str, Floats]]:
     posterior, node = hypothesis.fit.posterior, hypothesis.fit.operating.node
     states = [
-        manoeuvre.motion.evaluate(time) for manoeuvre, time in zip(posterior.manoeuvres, wrench.time, strict=True)
+        posterior.manoeuvres[r].motion.evaluate(time) for r, time in zip(wrench.recordings, wrench.time, strict=True)
     ]
     for order, kind in enumerate(("position", "speed", "acceleration")):
         for column, joint in enumerate(posterior.model.robot.joints):
             yield f"{kind} of {joint.name}", np.concatenate([state[order][:, column] for state in states])
     counts = [len(time) for time in wrench.time]
     for axis in range(3):
-        rates = [np.asarray(node.rate)[r, :n, axis] for r, n in enumerate(counts)]
+        rates = [np.asarray(node.rate)[r, :n, axis] for r, n in zip(wrench.recordings, counts, strict=True)]
         yield f"rate of the base about {'xyz'[axis]}", np.concatenate(rates)
     if posterior.model.orbit is not None:
-        phase = np.concatenate([np.asarray(node.environment.argument_of_latitude)[r, :n] for r, n in enumerate(counts)])
+        latitude = np.asarray(node.environment.argument_of_latitude)
+        phase = np.concatenate([latitude[r, :n] for r, n in zip(wrench.recordings, counts, strict=True)])
         yield "cosine of the argument of latitude", np.cos(phase)
         yield "sine of the argument of latitude", np.sin(phase)
     yield "time", np.concatenate(wrench.time)

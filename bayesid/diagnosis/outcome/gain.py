@@ -7,6 +7,7 @@ A. E. Raftery, Strictly proper scoring rules, prediction, and estimation, JASA 1
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, half_range
@@ -24,10 +26,12 @@ from bayesid.robot.inertial_parameters import PARAMETERS, mass_com_inertia
 from bayesid.simulation.sensors import SensorKind
 
 __all__ = [
+    "FOLDS",
     "BodyFigures",
     "Gain",
     "ParameterChange",
     "SimulationError",
+    "folds_of",
     "measure_gain",
     "parameter_changes",
     "simulation_errors",
@@ -35,6 +39,7 @@ __all__ = [
 ]
 
 PRIOR_DRAWS = 2000  # from which the width of the prior follows
+FOLDS = 10  # most refits: more recordings are left out in so many groups
 
 
 @dataclass(frozen=True)
@@ -53,8 +58,8 @@ class ModelFigures:
     Attributes
     ----------
     chi2_per_sample : float
-    held_out : (R,) array or None
-        Log predictive density of each recording given the others; None with a single recording.
+    held_out : (F,) array or None
+        Log predictive density of each fold of recordings (`folds_of`) given the others; None with a single recording.
     rms : dict of str to float
         Root mean square of the residual in sigma, by sensor channel.
     inside : float
@@ -89,7 +94,7 @@ def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | Non
     ----------
     before, after : Hypothesis
     executor : concurrent.futures.Executor, optional
-        Refits them without each of the recordings at once.
+        Refits them without each fold of the recordings at once.
     """
     first = _figures(before, executor)
     return Gain(first, first if after is before else _figures(after, executor))
@@ -113,20 +118,48 @@ def _figures(hypothesis: Hypothesis, executor: Executor | None) -> ModelFigures:
     )
 
 
+def folds_of(recordings: int) -> list[range]:
+    """Return the recordings that are left out together: each by itself, or in ten folds where there are more.
+
+    A fold takes every tenth recording, so that all folds see the same campaign. Source: M. Stone, Cross-validatory
+    choice and assessment of statistical predictions, Journal of the Royal Statistical Society B 36, 1974.
+    """
+    return [range(first, recordings, FOLDS) for first in range(min(recordings, FOLDS))]
+
+
 def _held_out(hypothesis: Hypothesis, executor: Executor | None) -> Floats:
-    """Log density of each recording given the others: the ratio of evidences with and without it (Laplace)."""
+    """Log density of each fold given the others: the ratio of evidences with and without it (Laplace)."""
     fit = hypothesis.fit
-    numbers = range(len(fit.posterior.manoeuvres))
+    folds = folds_of(len(fit.posterior.manoeuvres))
+    if len(fit.posterior.manoeuvres) > FOLDS:
+        return _held_out_by_steps(fit, folds)
     each = map if executor is None else executor.map
-    rest = np.array(list(each(_bare_without, [hypothesis] * len(numbers), numbers)))
-    return _bare(fit) - rest + fit.posterior.log_normalisation
+    rest = np.array(list(each(_bare_without, [hypothesis] * len(folds), folds)))
+    constants = fit.posterior.log_normalisation
+    return _bare(fit) - rest + np.array([constants[list(fold)].sum() for fold in folds])
 
 
-def _bare_without(hypothesis: Hypothesis, number: int) -> float:
-    """Log evidence, without constants, of all recordings but one."""
+def _held_out_by_steps(fit: Fit, folds: Sequence[range]) -> Floats:
+    """Return the same by one Gauss-Newton step each: a tenth of the data moves the mode by less than its deviation."""
+    residual, known = (by_recording(fit.posterior, part) for part in (fit.residual, fit.known))
+    values = np.concatenate([fit.own_coordinates, *fit.coordinates])
+    products, pulls = fit.known.T @ fit.known, fit.known.T @ fit.residual + values
+    densities = []
+    for fold in folds:
+        left_out, columns = residual[list(fold)].ravel(), known[list(fold)].reshape(-1, known.shape[2])
+        block = GaussianBlock.of(products - columns.T @ columns)
+        moved = block.share(pulls - columns.T @ left_out)
+        cost = fit.cost - 0.5 * float(left_out @ left_out + moved @ moved)
+        constant = float(fit.posterior.log_normalisation[list(fold)].sum())
+        densities.append(_bare(fit) + cost + block.half_log_det + constant)
+    return np.array(densities)
+
+
+def _bare_without(hypothesis: Hypothesis, fold: range) -> float:
+    """Log evidence, without constants, of all recordings but those of a fold."""
     fit = hypothesis.fit
     outputs = [whitening.outputs for whitening in fit.posterior.whitenings]
-    masks = [output if i == number else np.zeros_like(output) for i, output in enumerate(outputs)]
+    masks = [output if i in fold else np.zeros_like(output) for i, output in enumerate(outputs)]
     without = hypothesis.perturbed.with_posterior(leaving_out(fit.posterior, masks))
     return _bare(without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating))
 

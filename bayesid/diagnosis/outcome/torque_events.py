@@ -8,6 +8,7 @@ of Bernoulli-Gaussian processes, IEEE Transactions on Information Theory 28, 198
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -118,46 +119,57 @@ class EventCandidates:
     among: int
 
     @staticmethod
-    def of(hypothesis: Hypothesis, smooth: Floats, largest: float, finer: Floats | None = None) -> EventCandidates:
+    def of(
+        hypothesis: Hypothesis,
+        smooth: Floats,
+        largest: float,
+        recordings: Sequence[int],
+        finer: Floats | None = None,
+    ) -> EventCandidates:
         """Compute the responses to all events about a fit.
 
         Parameters
         ----------
         hypothesis : Hypothesis
-        smooth : (N, s) array
-            Columns of a smooth disturbance.
+        smooth : (n, s) array
+            Columns of a smooth disturbance in the rows of the recordings.
         largest : float
             Largest plausible torque [N m].
+        recordings : sequence of int
+            Numbers of those that are looked at; events count them from zero.
         finer : (k, 2) array, optional
             Instants and decays, relative to the length of each recording, of a part of a finer grid (`nearby`); by
             default the grid.
         """
         shapes = GRID if finer is None else finer
         perturbed, fit = hypothesis.perturbed, hypothesis.fit
+        looked_at = list(recordings)
         moments = (fit.operating.node, fit.operating.sample)
-        times = [np.asarray(instant.environment.time) for instant in moments]
+        times = [np.asarray(instant.environment.time)[looked_at] for instant in moments]
         ends = times[0].max(axis=1)
-        count, recordings = len(shapes), len(ends)
+        count = len(shapes)
         # between two nodes of the integration a jump would be lost: there it is averaged over a step
-        longest = np.asarray(perturbed.posterior.data.arrays.grid.step).max(axis=1)
+        longest = np.asarray(perturbed.posterior.data.arrays.grid.step)[looked_at].max(axis=1)
         torques = []
-        for time, width in zip(times, (longest, np.zeros(recordings)), strict=True):
+        for time, width in zip(times, (longest, np.zeros(len(ends))), strict=True):
             courses = np.stack([_courses(*row, shapes) for row in zip(time, ends, width, strict=True)], axis=1)
             about_axes = courses[:, None, ..., None] * np.eye(3)[:, None, None]  # (k, 3, R, S, 3)
             torques.append(about_axes.reshape(3 * count, *time.shape, 3))
-        blocks = torque_responses(hypothesis, *torques)
-        known, residual, apart = (by_recording(fit.posterior, x) for x in (fit.known, fit.residual, smooth))
-        cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
-        taken, of_smooth = fit.block.share(cross), fit.block.share(fit.known.T @ smooth)
+        blocks = torque_responses(hypothesis, *torques, recordings)
+        known, residual = (by_recording(fit.posterior, x)[looked_at] for x in (fit.known, fit.residual))
+        apart = smooth.reshape(len(ends), -1, smooth.shape[1])
+        cross = np.concatenate([part.T @ block for part, block in zip(known, blocks, strict=True)], axis=1)
+        taken = fit.block.share(cross)
+        of_smooth = fit.block.share(known.reshape(len(smooth), -1).T @ smooth)
         return EventCandidates(
-            np.repeat(np.arange(recordings), count),
+            np.repeat(np.arange(len(ends)), count),
             shapes,
             tuple(row for time, end in zip(times[0], ends, strict=True) for row in _courses(time, end, 0.0, shapes)),
             sla.block_diag(*(block.T @ block for block in blocks)) - taken.T @ taken,
-            np.concatenate([blocks[r].T @ apart[r] for r in range(recordings)]) - taken.T @ of_smooth,
-            np.concatenate([(blocks[r].T @ residual[r]).ravel() for r in range(recordings)]),
+            np.concatenate([block.T @ part for block, part in zip(blocks, apart, strict=True)]) - taken.T @ of_smooth,
+            np.concatenate([(block.T @ part).ravel() for block, part in zip(blocks, residual, strict=True)]),
             largest,
-            recordings * len(GRID) * (1 if finer is None else 2 * FINER * FINER),
+            len(ends) * len(GRID) * (1 if finer is None else 2 * FINER * FINER),
         )
 
     def nearby(self, events: ChosenEvents) -> Floats:
@@ -273,19 +285,22 @@ class EventCandidates:
         return Taken(np.concatenate([taken.share, block.share(rest)]), np.concatenate([taken.pull, block.share(score)]))
 
 
-def torque_responses(hypothesis: Hypothesis, nodes: Floats, samples: Floats) -> Floats:
-    """Return the responses of the whitened residual of each recording to torques on the base, (R, N / R, k).
+def torque_responses(hypothesis: Hypothesis, nodes: Floats, samples: Floats, recordings: Sequence[int]) -> Floats:
+    """Return the responses of the whitened residual of some recordings to torques on the base, (r, N / R, k).
 
     Parameters
     ----------
     hypothesis : Hypothesis
-    nodes, samples : (k, R, S, 3) and (k, R, T, 3) arrays
+    nodes, samples : (k, r, S, 3) and (k, r, T, 3) arrays
         Torques in base axes at the nodes of the integration and at the samples [N m].
+    recordings : (r,) sequence of int
+        Numbers of the recordings.
     """
     perturbed, fit = hypothesis.perturbed, hypothesis.fit
     node, sample = (np.concatenate([np.zeros_like(torque), torque], axis=-1) for torque in (nodes, samples))
-    perturbation = perturbed.perturbation(len(node), node_wrench=node, sample_wrench=sample)
-    return by_recording(fit.posterior, perturbed.respond(perturbation, fit.z, fit.data))
+    perturbation = perturbed.perturbation(len(node), len(recordings), node_wrench=node, sample_wrench=sample)
+    responses = perturbed.respond(perturbation, fit.z, fit.data, recordings)
+    return responses.reshape(len(recordings), -1, responses.shape[1])
 
 
 def _courses(time: Floats, end: float, width: float, shapes: Floats) -> Floats:

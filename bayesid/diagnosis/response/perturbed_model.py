@@ -137,9 +137,16 @@ class Fit:
             return -np.inf
         return -self.cost - self.block.half_log_det + float(self.posterior.log_normalisation.sum())
 
-    def project(self, columns: Floats) -> Floats:
-        """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
-        share = self.block.share(self.known.T @ columns)
+    def project(self, columns: Floats, rows: Integers | None = None) -> Floats:
+        """Inner products of columns after all that is fitted has taken its share, shape (n, n).
+
+        Parameters
+        ----------
+        columns : (N, n) array
+        rows : (N,) array of int, optional
+            Rows of the residual outside which the columns are zero and left out.
+        """
+        share = self.block.share((self.known if rows is None else self.known[rows]).T @ columns)
         return columns.T @ columns - share.T @ share
 
     def values(self, index: int) -> Floats:
@@ -365,22 +372,37 @@ class PerturbedModel:
     ) -> list[Floats]:
         """Return derivatives of the residual in the coordinates of each effect, (N, n)."""
 
-        def push(item: tuple[Effect, Floats]) -> Perturbation:
-            return linear_perturbation(*item, operating, self._table(item[0]))
+        def response(item: tuple[Effect, Floats]) -> Floats:
+            return self.respond(linear_perturbation(*item, operating, self._table(item[0])), z, data)
 
-        return [self.respond(pushes, z, data) for pushes in in_threads(push, effects)]
+        return in_threads(response, effects)
 
-    def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
-        """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
+    def respond(
+        self, perturbations: Perturbation, z: Floats, data: Arrays, recordings: Sequence[int] | None = None
+    ) -> Floats:
+        """Return derivatives of the residual along pushes with leading axis n, (N, n).
+
+        Parameters
+        ----------
+        perturbations : Perturbation
+        z : (size,) array
+            Coordinates.
+        data : Arrays
+        recordings : sequence of int, optional
+            Numbers of those to which pushes and residual belong, by default all.
+        """
         with ONE_AT_A_TIME:  # threads that need the same derivatives wait for the first of them
             if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
                 self._linear = LinearResponses.about(self.posterior, z, data)
             linear = self._linear
+        if recordings is not None and len(recordings) < len(self.posterior.manoeuvres):
+            linear = linear.part(recordings)
         return linear.along(perturbations).reshape(len(perturbations.reading), -1).T
 
-    def perturbation(self, count: int, **parts: Floats) -> Perturbation:
-        """Return ``count`` pushes with the named parts, the others zero."""
-        empty = Perturbation(*(np.zeros((count, *shape)) for shape in self._push_shapes()))
+    def perturbation(self, count: int, recordings: int | None = None, **parts: Floats) -> Perturbation:
+        """Return ``count`` pushes of all or so many recordings with the named parts, the others zero."""
+        whole = self._push_shapes()
+        empty = Perturbation(*(np.zeros((count, recordings or shape[0], *shape[1:])) for shape in whole))
         return empty._replace(**parts)
 
     def _pushed(self, perturbations: Sequence[Perturbation]) -> Arrays:

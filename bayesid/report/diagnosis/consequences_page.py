@@ -80,6 +80,8 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
 def _add_wrench(document: Document, result: Diagnosis) -> None:
     """Add the figures of the disturbance and the table of its correlations; in all axes where nothing is named."""
     cause = torque_of_causes(result.after) if result.named else None
+    if cause is not None:
+        cause = [cause[r] for r in result.disturbance.recordings]
     dashed = " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
     frames = [Frame.BASE]
     if not result.named:

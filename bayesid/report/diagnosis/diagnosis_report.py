@@ -55,7 +55,8 @@ def diagnosis_report(
     add_consequences(document, result)
     add_limits(document, result, result.advice)
     identification = result.identification
-    refusal = None if identification is not None else _refusal(result)
+    many = result.bounded is not None  # of many recordings the extended model is simulated in full only to be sampled
+    refusal = None if identification is not None or many else _refusal(result)
     if refusal is not None:
         document.section("Assumptions")
         document.paragraph(f"The extended model was neither simulated in full nor sampled: {refusal}.")
@@ -64,7 +65,7 @@ def diagnosis_report(
     add_appendix(document, result)
     if identification is not None:
         _add_sampled(document, result, identification)
-    elif refusal is None:
+    elif refusal is None and not many:
         add_measured(document, result)
     document.write(file)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bayesid._io.words import joined
+from bayesid._io.words import abridged, joined
 from bayesid.diagnosis import (
     Diagnosis,
     DisturbingWrench,
@@ -78,10 +78,22 @@ def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
     yield from cause_sentences(result)
     yield from alternative_sentences(result)
     yield gain_sentence(result)
+    if result.undetermined:
+        yield undetermined_sentence(result)
     if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         yield wrench_sentence(result.unexplained)
     if result.torques is not None:
         yield torque_sentence(result.torques)
+
+
+def undetermined_sentence(result: Diagnosis) -> str:
+    """Return which inertial parameters the recordings say nothing of, whatever the verdict."""
+    bodies = [prior.name for prior in result.before.fit.posterior.model.bodies]
+    every = len(result.undetermined) == len(result.parameter_changes)
+    what = f"any parameter of {joined(bodies)}" if every else abridged(result.undetermined)
+    return (
+        f"These recordings do not determine {what}: the posterior is the prior. Record joints that move, far and fast."
+    )
 
 
 def verdict_sentence(result: Diagnosis) -> str:

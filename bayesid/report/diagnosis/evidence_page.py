@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.outcome.gain import folds_of
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence, gain_sentence
 from bayesid.report.document import Document, Rows
@@ -88,11 +90,17 @@ def gain_rows(result: Diagnosis) -> Rows:
     if before.held_out is not None and after.held_out is not None:
         rows += [
             _measure(f"held-out log score of {name}", float(one), float(two), 1)
-            for name, one, two in zip(result.recordings, before.held_out, after.held_out, strict=True)
+            for name, one, two in zip(_left_out(result.recordings), before.held_out, after.held_out, strict=True)
         ]
         rows.append(_measure("held-out log score, sum", float(before.held_out.sum()), float(after.held_out.sum()), 1))
     expected += ["higher is better"] * (len(rows) - len(expected))
     return [[*row, text] for row, text in zip(rows, expected, strict=True)]
+
+
+def _left_out(recordings: Sequence[str]) -> list[str]:
+    """Return what is left out at a time: a recording, or where there are many a group of them."""
+    folds = folds_of(len(recordings))
+    return [recordings[fold[0]] if len(fold) == 1 else f"every tenth from {recordings[fold[0]]}" for fold in folds]
 
 
 def _measure(name: str, before: float, after: float | None, decimals: int) -> list[str]:

@@ -67,9 +67,11 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
 
 def add_assumptions(document: Document, result: Diagnosis) -> None:
     """Add what the model with the named causes assumes."""
-    posterior = result.posterior
+    present = result.before.fit
+    many = result.bounded is not None and result.identification is None  # what is not built to be sampled
+    posterior, z = (present.posterior, present.z) if many else (result.posterior, result.start)
     document.section("Assumptions")
-    document.items(list(model_sentences(posterior, integration_error_at(posterior, result.start))))
+    document.items(list(model_sentences(posterior, integration_error_at(posterior, z))))
     add_joints(document, posterior)
 
 
@@ -108,6 +110,8 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
             "Every fit of the present model drove its bodies to where their prior all but excludes them. They are held "
             "at the prior's centre, and what each candidate changes is computed along the motion that the data show."
         )
+    if result.bounded is not None:
+        yield result.bounded
     yield f"Seed of all random numbers: {result.seed}."
 
 

@@ -1,0 +1,104 @@
+"""Size of a diagnosis, estimated from the study before it runs: memory, time, and what cannot fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bayesid._math.memory import GIGABYTE, refuse_beyond_memory
+from bayesid.diagnosis.candidates.cause_kind import kind_of
+from bayesid.diagnosis.candidates.generic_cause import generic_columns, instants_of_each
+from bayesid.diagnosis.candidates.instant_cause import INSTANTS, InstantCause
+from bayesid.diagnosis.candidates.linear_cause import group_names
+from bayesid.diagnosis.candidates.vibration_cause import FREQUENCIES
+from bayesid.inference.memory_estimate import FEWER
+from bayesid.inference.posterior import Posterior
+from bayesid.robot.composite_tables import WIDTH
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = ["RunSize"]
+
+NUMBER = 8.0
+"""Size of a number [bytes]."""
+
+PROGRAM = 0.7 * GIGABYTE
+"""Memory of the program with its compiled code [bytes]."""
+
+BANKS, GRAMS = 2.2, 5.0
+"""Sets of columns, and matrices of the size of the Gram, that exist at once: about two fits, and factors of them."""
+
+FEWEST, PER_NUMBER, PER_COLUMN = 4.0, 3e-7, 1e-6
+"""Time of the smallest diagnosis, for each number in the columns, and for each number in the Gram [s]."""
+
+TOGETHER = 64
+"""Perturbations that are computed at once."""
+
+
+@dataclass(frozen=True)
+class RunSize:
+    """Size of a diagnosis.
+
+    Attributes
+    ----------
+    rows : int
+        Scalars of the residual, those that fill the recordings up to one length among them.
+    shared, local : int
+        Columns that act in all recordings, and those that act in one.
+    unknowns : int
+        Unknowns of the model.
+    instants : int
+        Nodes and samples of all recordings.
+    """
+
+    rows: int
+    shared: int
+    local: int
+    unknowns: int
+    instants: int
+
+    @staticmethod
+    def of(posterior: Posterior, effects: Sequence[Effect]) -> RunSize:
+        """Return the size of a diagnosis.
+
+        Parameters
+        ----------
+        posterior : Posterior
+            Of the present model.
+        effects : sequence of Effect
+            Candidates.
+        """
+        recordings = len(posterior.manoeuvres)
+        shared, local = dict[str, int](), generic_columns(posterior)
+        for effect in effects:
+            amplitudes = len(effect.amplitude_quantities)
+            if effect.modes_count:
+                shared[effect.label] = amplitudes * len(FREQUENCIES)
+            elif isinstance(kind_of(effect), InstantCause):
+                local += recordings * amplitudes * instants_of_each(INSTANTS, recordings)
+            else:
+                times = recordings if effect.per_recording else 1
+                shared["".join(group_names(effect).values())] = amplitudes * times
+        grid = posterior.data.arrays.grid
+        instants = grid.node.known.shape[1] + grid.sample.known.shape[1]
+        outputs = posterior.residual_shape[1] * posterior.residual_shape[2]
+        return RunSize(recordings * outputs, sum(shared.values()), local, posterior.size, recordings * instants)
+
+    @property
+    def memory(self) -> float:
+        """Largest memory of the diagnosis [bytes]."""
+        columns = BANKS * self.shared + 4.0 * self.unknowns
+        perturbations = 2.0 * TOGETHER * self.instants * (WIDTH + 6)
+        return PROGRAM + NUMBER * (self.rows * columns + GRAMS * (self.shared + self.local) ** 2 + perturbations)
+
+    @property
+    def seconds(self) -> float:
+        """Time of the diagnosis on two cores with compiled code kept, within a factor of two [s]."""
+        return FEWEST + PER_NUMBER * self.rows * self.shared + PER_COLUMN * (self.shared + self.local) ** 2
+
+    def __str__(self) -> str:
+        """Return time and memory in words."""
+        return f"about {self.seconds:.0f} s and {self.memory / GIGABYTE:.1f} GB in all"
+
+    def refuse(self) -> None:
+        """Raise an `InputError` if the diagnosis cannot fit into the memory that is free."""
+        refuse_beyond_memory(self.memory, f"a diagnosis of {self.rows} samples with {self.shared} columns", FEWER)
