@@ -19,6 +19,7 @@ __all__ = ["check_report"]
 
 DRAWN = 12  # most recordings that are shown in full
 
+
 def check_report(
     posterior: Posterior,
     checks: Sequence[RecordingCheck],
