@@ -152,6 +152,8 @@ def planned_manoeuvres(
     robot, (noise, assumed) = model.robot, assume_missing(encoder_noise(study, model.robot))
     planned = []
     for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
-        motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
+        motion = MeasuredMotion.from_recording(
+            manoeuvre.recording, robot, sigma=noise, start=section.start, blocks_per_second=manoeuvre.blocks_per_second
+        )
         planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
     return planned, assumed

@@ -248,13 +248,16 @@ def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Ma
     for name in section.start:
         number = study.recordings.index(section) + 1
         named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)
-    motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
+    blocks = study.telemetry.blocks_per_second
+    noise = encoder_noise(study, robot)
+    motion = MeasuredMotion.from_recording(recording, robot, sigma=noise, start=section.start, blocks_per_second=blocks)
     return Manoeuvre(
         recording=recording,
         motion=motion,
         attitude=np.array(section.attitude),
         attitude_sigma=section.attitude_sigma,
         argument_of_latitude=section.argument_of_latitude or 0.0,
+        blocks_per_second=blocks,
     )
 
 

@@ -27,6 +27,7 @@ from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = [
     "Arrays",
+    "Averaging",
     "Numbers",
     "Perturbation",
     "Simulated",
@@ -66,8 +67,17 @@ class Numbers(NamedTuple):
     prior: PriorNumbers
 
 
+class Averaging(NamedTuple):
+    """Means of the samples over B blocks of time, (R, B, 2, C): two samples of each column, and their weights."""
+
+    sample: Traceable
+    weight: Traceable
+
+
 class Arrays(NamedTuple):
     """Arrays of R recordings, stacked and padded: T samples, C columns of `Channels`, O whitened blocks.
+
+    Where readings are means over blocks of time, the samples are the instants from which the model predicts these.
 
     Attributes
     ----------
@@ -83,6 +93,8 @@ class Arrays(NamedTuple):
         Weights of the whitening (`bayesid.inference.whitening.Whitening`).
     start : (R, O) array
         First row of the residual that enters each whitened block.
+    averaging : Averaging, optional
+        Means of the samples that are the rows of the residual, None where every sample is a row of its own.
     """
 
     grid: Grid
@@ -91,6 +103,7 @@ class Arrays(NamedTuple):
     offset: Array
     weights: Array
     start: Array
+    averaging: Averaging | None = None
 
 
 class Perturbation(NamedTuple):
@@ -194,7 +207,7 @@ def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) 
     arrays : Arrays
         Data, which may be `perturbed`.
     """
-    return _whitened(arrays.weights, arrays.start, _deviations(structure, numbers, z, _bare(arrays))[None])[0]
+    return _whitened(arrays, _deviations(structure, numbers, z, _bare(arrays))[None])[0]
 
 
 def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Floats:
@@ -209,7 +222,7 @@ def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -
     arrays : Arrays
         Data, which may be `perturbed`.
     """
-    packed = _whitened(arrays.weights, arrays.start, _slopes(structure, numbers, z, _bare(arrays)))
+    packed = _whitened(arrays, _slopes(structure, numbers, z, _bare(arrays)))
     return structure.layout.unpacked(np.asarray(packed))
 
 
@@ -242,7 +255,7 @@ def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> 
         Data, which may be `perturbed`.
     """
     node, sample, read, deviation = _traced(structure, numbers, z, _bare(arrays))
-    return Traced(node, sample, read, _whitened(arrays.weights, arrays.start, deviation[None])[0])
+    return Traced(node, sample, read, _whitened(arrays, deviation[None])[0])
 
 
 def linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
@@ -288,7 +301,7 @@ def read_out(
         Changes of the faulty readings.
     """
     changes = _read_out(structure, numbers, z, _bare(arrays), raw, along, offset)
-    return _whitened(arrays.weights, arrays.start, changes)
+    return _whitened(arrays, changes)
 
 
 @kept_jit(static=1)
@@ -329,16 +342,32 @@ def _traced(
     return node, sample, read, structure.simulator.residual(read, arrays.measured) - arrays.offset
 
 
+def _whitened(arrays: Arrays, deviations: Array) -> Array:
+    """Average and whiten n deviations of all recordings, shape (n, R, T, C) -> (n, R, O, C)."""
+    rows = deviations if arrays.averaging is None else _averaged(arrays.averaging, deviations)
+    return _banded(arrays.weights, arrays.start, rows)
+
+
 @kept_jit()
-def _whitened(weights: Array, start: Array, deviations: Array) -> Array:
-    """Whiten n deviations of all recordings, shape (n, R, T, C) -> (n, R, O, C)."""
+def _averaged(averaging: Averaging, deviations: Array) -> Array:
+    """Return means of n deviations over blocks of time, (n, R, T, C) -> (n, R, B, C)."""
+    first, second = (
+        jax.vmap(lambda one, at=averaging.sample[:, :, side]: jnp.take_along_axis(one, at, 1))(deviations)
+        for side in (0, 1)
+    )
+    return averaging.weight[:, :, 0] * first + averaging.weight[:, :, 1] * second
+
+
+@kept_jit()
+def _banded(weights: Array, start: Array, deviations: Array) -> Array:
+    """Whiten the rows of n deviations, shape (n, R, T, C) -> (n, R, O, C)."""
     padded = jnp.pad(deviations, ((0, 0), (0, 0), (0, weights.shape[3]), (0, 0)))
     return jax.vmap(jax.vmap(whitening.apply), in_axes=(None, None, 0))(weights, start, padded)
 
 
 def _bare(arrays: Arrays) -> Arrays:
-    """Return the arrays without whitening, on whose window the simulation does not depend."""
-    return arrays._replace(weights=_NONE, start=_NONE)
+    """Return the arrays without averaging and whitening, on which the simulation does not depend."""
+    return arrays._replace(weights=_NONE, start=_NONE, averaging=None)
 
 
 _NONE: Any = np.zeros(0)

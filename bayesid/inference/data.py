@@ -13,11 +13,13 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
-from bayesid.inference.compiled import Arrays
+from bayesid.inference.compiled import Arrays, Averaging
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening
 from bayesid.recording.actions import Actions
+from bayesid.recording.blocks import Blocks
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
+from bayesid.recording.lattice import lattice_step, mean_deviation
 from bayesid.recording.recording import Recording
 from bayesid.recording.wheel_motion import WheelMotion, check_wheels
 from bayesid.robot.robot import Robot
@@ -73,11 +75,11 @@ class Data:
         return (len(self.manoeuvres), self.arrays.start.shape[1], self.arrays.weights.shape[2])
 
     def times(self, index: int) -> Floats:
-        """Return the times at which any sensor of a recording was sampled, shape (T,) [s]."""
+        """Return the times at which any sensor of a recording was sampled, or means of blocks, shape (T,) [s]."""
         return self.recorded[index].time
 
     def measured(self, index: int, kind: SensorKind) -> Series:
-        """Return the recorded times and values of one sensor in one recording.
+        """Return the recorded times and values of one sensor in one recording, means where it is reduced to blocks.
 
         Parameters
         ----------
@@ -92,7 +94,7 @@ class Data:
         return self.recorded[index].torque
 
     def sigma(self, index: int, kind: SensorKind) -> Floats:
-        """Return the standard deviations of the white noise of one sensor in one recording, shape (size,).
+        """Return the standard deviations of the white noise in `measured` of one sensor in one recording, (size,).
 
         Parameters
         ----------
@@ -102,14 +104,37 @@ class Data:
         """
         return self.recorded[index].sigma(kind)
 
+    def sigma_per_sample(self, index: int, kind: SensorKind) -> Floats:
+        """Return the standard deviations of the white noise of the samples of one sensor in one recording, (size,).
+
+        Parameters
+        ----------
+        index : int
+            Number of the recording.
+        kind : SensorKind
+        """
+        return self.recorded[index].sigma_per_sample(kind)
+
+    def samples_of(self, index: int, kind: SensorKind) -> Series:
+        """Return times and values of all samples of one sensor in one recording, before any average.
+
+        Parameters
+        ----------
+        index : int
+            Number of the recording.
+        kind : SensorKind
+        """
+        return self.manoeuvres[index].recording.vector(kind.value, kind.axes)
+
     def left_out_times(self, index: int) -> dict[SensorKind, Floats]:
-        """Return, for each sensor, the times of the samples that the likelihood leaves out of one recording [s]."""
-        mask, rows = self.left_out[index], self.whitenings[index].rows
+        """Return, for each sensor, the stamps of the samples that the likelihood leaves out of one recording [s]."""
+        mask, rows, recorded = self.left_out[index], self.whitenings[index].rows, self.recorded[index]
         result = {}
         for kind in self.model.channels.kinds:
             gone = mask[:, self.model.channels.of(kind)].any(axis=1)
             if gone.any():
-                result[kind] = self.recorded[index].time[rows[gone]]
+                blocks = recorded.blocks[kind.value]
+                result[kind] = blocks.stamps[blocks.samples_of(np.searchsorted(blocks.time, recorded.time[rows[gone]]))]
         return result
 
 
@@ -134,15 +159,15 @@ def grids_of(
                 model.robot,
                 tuple(prior.name for prior in model.priors),
                 manoeuvre.motion,
-                samples.time,
+                samples.nodes,
                 step,
                 orbit=model.orbit,
                 argument_of_latitude=manoeuvre.argument_of_latitude,
-                actions=Actions.from_recording(manoeuvre.recording, model.robot.wheels),
+                actions=Actions.from_recording(manoeuvre.recording, model.robot.wheels, manoeuvre.blocks_per_second),
                 effects=effects,
                 torques=model.torque is not None,
                 speed_errors=model.has_speed_errors,
-                jumps=[instant for effect in effects for instant in effect.jumps(float(samples.time[-1]))],
+                jumps=[instant for effect in effects for instant in effect.jumps(float(samples.nodes[-1]))],
             )
         )
     return grids
@@ -178,13 +203,31 @@ def stacked(
         return on_device(np.stack([lengthened(series, count) for series in values]))
 
     measured = Readings(
-        padded([recording.time for recording in recorded]),
+        padded([recording.nodes for recording in recorded]),
         {kind.value: padded([recording.gridded(kind) for recording in recorded]) for kind in model.channels.kinds},
         padded([recording.gridded_torque for recording in recorded]),
     )
     offset = on_device(np.zeros((len(recorded), count, model.channels.count)))
     none = on_device(np.zeros(0))
-    return with_whitenings(Arrays(grid, on_device(attitudes_of(manoeuvres)), measured, offset, none, none), whitenings)
+    attitudes, averaging = on_device(attitudes_of(manoeuvres)), _averaging(model, recorded)
+    return with_whitenings(Arrays(grid, attitudes, measured, offset, none, none, averaging), whitenings)
+
+
+def _averaging(model: Model, recorded: Sequence[RecordedSamples]) -> Averaging | None:
+    """Return the means that are the rows of the residual; None where no sensor is reduced to blocks."""
+    if not any(recording.reduced for recording in recorded):
+        return None
+    sizes = [(name, columns.stop - columns.start) for name, columns in model.channels.groups()]
+    length = rounded(max(len(recording.time) for recording in recorded))
+
+    def stacked(part: int) -> Floats:
+        each = [
+            np.concatenate([np.repeat(of[name][part][:, :, None], size, axis=2) for name, size in sizes], axis=2)
+            for of in ({name: recording.average(name) for name, _ in sizes} for recording in recorded)
+        ]
+        return np.stack([lengthened(rows, length) for rows in each])
+
+    return Averaging(on_device(stacked(0).astype(np.int32)), on_device(stacked(1)))
 
 
 def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
@@ -217,6 +260,8 @@ Series = tuple[Floats, Floats]
 class RecordedSamples:
     """Sensor samples of one recording on one grid of all times at which any sensor was sampled.
 
+    Samples of a sensor that is faster than the blocks of its manoeuvre are means over these.
+
     Parameters
     ----------
     motion : Motion
@@ -225,6 +270,12 @@ class RecordedSamples:
     torque_sensor : TorqueSensor or None
     time : (T,) array
         Times of the grid [s].
+    nodes : (N,) array
+        Instants that are simulated [s]: those times, or what means over blocks are predicted from.
+    blocks : mapping of str to Blocks
+        Samples that each reading is the mean of, by the family of the channels.
+    steps : mapping of str to tuple
+        Step of the lattice on which the samples of each column lie, None where on none or where nothing is reduced.
     series : mapping of SensorKind to Series
         Recorded times and readings of each sensor.
     torque : Series
@@ -240,38 +291,97 @@ class RecordedSamples:
     sensors: tuple[Sensor, ...]
     torque_sensor: TorqueSensor | None
     time: Floats
+    nodes: Floats
+    blocks: Mapping[str, Blocks]
+    steps: Mapping[str, tuple[float | None, ...]]
     series: Mapping[SensorKind, Series]
     torque: Series
     torque_rows: tuple[Integers, ...]
     wheels: WheelMotion
 
     @classmethod
-    def of(cls, model: Model, manoeuvre: Manoeuvre) -> RecordedSamples:
+    def of(cls, model: Model, manoeuvre: Manoeuvre, index: int = 0) -> RecordedSamples:
         """Return the samples of the sensors of a model in one recording.
 
         Parameters
         ----------
         model : Model
         manoeuvre : Manoeuvre
+        index : int
+            Number of the recording, for effects that differ between recordings.
 
         Raises
         ------
         InputError
             If the recording lacks a declared sensor, has too few samples of it, or ends earlier for a joint.
         """
-        recording = manoeuvre.recording
+        recording, per_second = manoeuvre.recording, manoeuvre.blocks_per_second
         check_wheels(recording, model.robot.wheels)
-        series = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
+        effects = [effect.in_recording(index) for effect in model.effects]
+        jumps = [instant for effect in effects for instant in effect.jumps(float(recording.time[-1]))]
+        breaks = np.concatenate([Actions.from_recording(recording, (), per_second).changes, jumps])
+        blocks: dict[str, Blocks] = {}
+        steps: dict[str, tuple[float | None, ...]] = {}
+        series: dict[SensorKind, Series] = {}
+        for sensor in model.sensors:
+            kind = sensor.kind
+            stamps, values = _series(recording, kind.value, kind.axes)
+            blocks[kind.value] = one = Blocks.of(stamps, per_second, breaks)
+            series[kind] = one.time, kind.mean(values, one.weight_of_samples, one.first) if one.reduced else values
+            steps[kind.value] = _steps(one, values) if kind.is_difference else (None,) * kind.size
         torque: Series = (np.zeros(0), np.zeros((0, 0)))
         if model.torque is not None:
-            torque = _series(recording, "torque", model.torque.joints)
-        time = np.unique(np.concatenate([*(times for times, _ in series.values()), torque[0]]))
+            stamps, values = _series(recording, "torque", model.torque.joints)
+            blocks["torque"] = one = Blocks.of(stamps, per_second, breaks)
+            torque, steps["torque"] = (one.time, one.mean(values)), _steps(one, values)
+        time = np.unique(np.concatenate([one.time for one in blocks.values()]))
+        nodes = np.unique(np.concatenate([one.node.ravel() for one in blocks.values()]))
         if isinstance(manoeuvre.motion, MeasuredMotion):
-            manoeuvre.motion.check_extent(float(time[-1]), recording.file or recording.name)
+            manoeuvre.motion.check_extent(float(nodes[-1]), recording.file or recording.name)
         rows = np.searchsorted(time, torque[0])
         used = tuple(rows[moving] for moving in _moving(model, manoeuvre.motion, torque[0]))
-        wheels = WheelMotion.from_recording(recording, model.robot.wheels)
-        return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used, wheels)
+        wheels = WheelMotion.from_recording(recording, model.robot.wheels, per_second)
+        return cls(
+            manoeuvre.motion, model.sensors, model.torque, time, nodes, blocks, steps, series, torque, used, wheels
+        )
+
+    @property
+    def reduced(self) -> bool:
+        """Whether any sensor's samples are means over blocks."""
+        return any(one.reduced for one in self.blocks.values())
+
+    def average(self, family: str) -> tuple[Integers, Floats]:
+        """Return the nodes and weights (T, 2) of each row's mean of a family of channels.
+
+        Rows at which it was not sampled have those of a sensor that was.
+
+        Parameters
+        ----------
+        family : str
+        """
+        node, weight = np.zeros((len(self.time), 2), dtype=int), np.zeros((len(self.time), 2))
+        for one in (*self.blocks.values(), self.blocks[family]):
+            rows = np.searchsorted(self.time, one.time)
+            node[rows], weight[rows] = np.searchsorted(self.nodes, one.node), one.weight
+        return node, weight
+
+    def averaged(self, values: Floats, family: str | None = None, kind: SensorKind | None = None) -> Floats:
+        """Return the means of predictions at the nodes, (N, ...) -> (T, ...).
+
+        Parameters
+        ----------
+        values : (N, ...) array
+        family : str, optional
+            Family of channels whose blocks they are averaged over, by default that of the first sensor.
+        kind : SensorKind, optional
+            Whose readings they are, by default a quantity that may be added.
+        """
+        if not self.reduced:
+            return values
+        node, weight = self.average(family or next(iter(self.blocks)))
+        if kind is None:
+            return np.einsum("tk,tk...->t...", weight, values[node])
+        return kind.mean(values[node.ravel()], weight.ravel(), np.arange(0, weight.size, 2))
 
     def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> RecordedSamples:
         """Return the same samples with other noise of the sensors.
@@ -288,16 +398,18 @@ class RecordedSamples:
         return np.searchsorted(self.time, self.series[kind][0])
 
     def gridded(self, kind: SensorKind) -> Floats:
-        """Return the readings of a sensor on the grid, (T, axes), with its reading at rest where it was not sampled."""
-        values = np.tile(np.array(kind.rest), (len(self.time), 1))
-        values[self.rows(kind)] = self.series[kind][1]
+        """Return the readings of a sensor at the nodes, (N, axes), its reading at rest where it was not sampled."""
+        values = np.tile(np.array(kind.rest), (len(self.nodes), 1))
+        for side in self.blocks[kind.value].node.T:
+            values[np.searchsorted(self.nodes, side)] = self.series[kind][1]
         return values
 
     @property
     def gridded_torque(self) -> Floats:
-        """Torques on the grid, shape (T, n), zero where they were not sampled."""
-        values = np.zeros((len(self.time), self.torque[1].shape[1]))
-        values[np.searchsorted(self.time, self.torque[0])] = self.torque[1]
+        """Torques at the nodes, shape (N, n), zero where they were not sampled."""
+        values = np.zeros((len(self.nodes), self.torque[1].shape[1]))
+        for side in self.blocks["torque"].node.T if "torque" in self.blocks else ():
+            values[np.searchsorted(self.nodes, side)] = self.torque[1]
         return values
 
     @property
@@ -309,9 +421,13 @@ class RecordedSamples:
         return np.zeros(3)
 
     def sigma(self, kind: SensorKind) -> Floats:
-        """Return the standard deviations of the white noise of a sensor, shape (size,)."""
+        """Return the standard deviations of the white noise of a reading of a sensor, shape (size,)."""
+        return self.sigma_per_sample(kind) / np.sqrt(self.blocks[kind.value].typical)
+
+    def sigma_per_sample(self, kind: SensorKind) -> Floats:
+        """Return the standard deviations of the white noise of a sample of a sensor, shape (size,)."""
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
-        return sensor.noise.sigma(float(np.median(np.diff(self.series[kind][0]))))
+        return sensor.noise.sigma(self.blocks[kind.value].interval)
 
     def noise_model(self, robot: Robot, seen: SampledMotion) -> SampleNoise:
         """Return the second moments of the errors.
@@ -324,14 +440,12 @@ class RecordedSamples:
             Motion of the base on the grid.
         """
         torque_sigma = () if self.torque_sensor is None else self.torque_sensor.sigma
-        channels = [
-            NoiseChannel(float(value), self.rows(sensor.kind), sensor.filter, coloured)
-            for sensor in self.sensors
-            for value, coloured in zip(self.sigma(sensor.kind), _coloured(sensor), strict=True)
-        ]
-        channels += [
-            NoiseChannel(sigma, rows, Filter()) for sigma, rows in zip(torque_sigma, self.torque_rows, strict=True)
-        ]
+        channels = [channel for sensor in self.sensors for channel in self._noise_channels(sensor)]
+        for column, (sigma, rows) in enumerate(zip(torque_sigma, self.torque_rows, strict=True)):
+            one = self.blocks["torque"]
+            relative = mean_deviation(one, self.torque[1][:, column], sigma, self.steps["torque"][column])
+            used = np.searchsorted(one.time, self.time[rows])
+            channels.append(NoiseChannel(sigma * relative[used], rows, Filter()))
         measured = isinstance(self.motion, MeasuredMotion) and bool(robot.joints)
         if not measured and not robot.wheels:
             empty = np.zeros((0, 3, len(self.time), len(channels)))
@@ -344,6 +458,31 @@ class RecordedSamples:
             covariance = np.concatenate([self.motion.lag_covariance(self.time, lags), covariance])
         return SampleNoise(self.time, channels, sensitivity[-len(covariance) :], covariance)
 
+    def _noise_channels(self, sensor: Sensor) -> list[NoiseChannel]:
+        """Return the noise of every axis of a sensor."""
+        one, rows = self.blocks[sensor.kind.value], self.rows(sensor.kind)
+        noise, filtered = sensor.coloured, _filter_of_blocks(sensor.filter, one)
+        levels = (0.0,) * sensor.kind.size if noise is None else noise.sigma
+        memory, values = 1.0 if noise is None else noise.time, self.series[sensor.kind][1]
+        channels = []
+        for axis, (sigma, level) in enumerate(zip(self.sigma_per_sample(sensor.kind), levels, strict=True)):
+            relative = mean_deviation(one, values[:, axis], float(sigma), self.steps[sensor.kind.value][axis])
+            channels.append(NoiseChannel(sigma * relative, rows, filtered, (level, memory), one.count, one.interval))
+        return channels
+
+
+def _steps(blocks: Blocks, values: Floats) -> tuple[float | None, ...]:
+    return tuple(lattice_step(column) if blocks.reduced else None for column in values.T)
+
+
+def _filter_of_blocks(given: Filter, blocks: Blocks) -> Filter:
+    """Return the filter of samples as one of means over blocks, which leave nothing of what is faster than they."""
+    if not blocks.reduced:
+        return given
+    rate = 1.0 / float(np.median(np.diff(blocks.time)))
+    low_pass = given.low_pass if given.low_pass is not None and given.low_pass < 0.5 * rate else None
+    return Filter(low_pass, max(1, round(given.decimate / blocks.typical)))
+
 
 def first_rate(sensor: Sensor, values: Floats) -> Floats:
     """Return the mean of the first three samples (n, 3) of a rate sensor, base axes, as the rate at the start.
@@ -355,11 +494,6 @@ def first_rate(sensor: Sensor, values: Floats) -> Floats:
         Its readings [rad/s].
     """
     return np.asarray(sensor.rotation @ values[:3].mean(axis=0))
-
-
-def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
-    noise = sensor.coloured
-    return [(0.0, 1.0)] * sensor.kind.size if noise is None else [(level, noise.time) for level in noise.sigma]
 
 
 def _moving(model: Model, motion: Motion, time: Floats) -> list[NDArray[np.bool_]]:

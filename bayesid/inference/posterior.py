@@ -29,6 +29,7 @@ from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.own_effects import check_own_effect
+from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = ["BATCH", "Posterior", "whiten"]
@@ -98,7 +99,7 @@ class Posterior:
             check_own_effect(effect, model.robot, model.sensors)
         if not manoeuvres:
             raise InputError("there is no recording", remedy="Give at least one")
-        recorded = tuple(RecordedSamples.of(model, manoeuvre) for manoeuvre in manoeuvres)
+        recorded = tuple(RecordedSamples.of(model, manoeuvre, index) for index, manoeuvre in enumerate(manoeuvres))
         refuse_large_recordings(model, recorded)
         unknowns = _unknowns(model, manoeuvres, recorded)
         numbers, structure = _numbers(model, unknowns), _structure(model, unknowns)
@@ -336,8 +337,10 @@ def whiten(
     rates, attitudes = np.asarray(simulated.rate), np.asarray(simulated.quaternion)
     result = []
     for index, (samples, grid) in enumerate(zip(recorded, grids, strict=True)):
-        count = len(samples.time)
-        seen = SampledMotion(attitudes[index, :count], rates[index, :count], grid.sample.environment)
+        count = len(samples.nodes)
+        attitude = samples.averaged(attitudes[index, :count], kind=SensorKind.ATTITUDE)
+        environment = jax.tree.map(lambda x, s=samples: s.averaged(np.asarray(x)), grid.sample.environment)
+        seen = SampledMotion(attitude, samples.averaged(rates[index, :count]), environment)
         window = None if windows is None else windows[index]
         result.append(whitening.build(samples.noise_model(robot, seen), window))
     return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,9 +94,10 @@ def _by_recording(posterior: Posterior, simulated: Simulated) -> list[PredictedR
     channels = {kind: np.asarray(readings.channels[kind.value]) for kind in model.channels.kinds}
     result = []
     for index, samples in enumerate(posterior.data.recorded):
-        count = len(samples.time)
-        predicted = {kind: values[index, :count] for kind, values in channels.items()}
-        result.append(PredictedReadings(samples.time, predicted, torque[index, :count]))
+        count = len(samples.nodes)
+        predicted = {kind: samples.averaged(each[index, :count], kind.value, kind) for kind, each in channels.items()}
+        torques = samples.averaged(torque[index, :count], None if model.torque is None else "torque")
+        result.append(PredictedReadings(samples.time, predicted, torques))
     return result
 
 
@@ -181,7 +182,12 @@ def simulate_recordings(
     z : (size,) array, optional
         Coordinates at which the recordings are simulated, by default `Posterior.starting_point`.
     """
-    predictions = predicted_readings(posterior, posterior.starting_point() if z is None else z)
+    z = posterior.starting_point() if z is None else z
+    if any(samples.reduced for samples in posterior.data.recorded):
+        whole = [replace(manoeuvre, blocks_per_second=0.0) for manoeuvre in posterior.manoeuvres]
+        unreduced = Posterior.of(posterior.model, whole, step=posterior.step, window=0)
+        posterior = replace(unreduced, unknowns=posterior.unknowns)
+    predictions = predicted_readings(posterior, z)
     recordings = []
     for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
         recording = manoeuvre.recording

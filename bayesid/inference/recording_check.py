@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
+from bayesid.inference.data import Data
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -222,7 +223,7 @@ def _check(posterior: Posterior, index: int, predicted: PredictedReadings) -> Re
         duration=float(recording.time[-1] - recording.time[0]),
         channels=_channels(recording, model),
         joints=_joints(manoeuvre, model.robot),
-        sensors=tuple(_sensor(sensor, manoeuvre, predicted) for sensor in model.sensors),
+        sensors=tuple(_sensor(sensor, posterior.data, index, predicted) for sensor in model.sensors),
         rate_is_differenced=_is_differenced(manoeuvre, model),
         stuck=_stuck(recording, model),
         unused=_unused(recording, model),
@@ -284,16 +285,18 @@ def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
     return tuple(checks)
 
 
-def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, predicted: PredictedReadings) -> SensorCheck:
+def _sensor(sensor: Sensor, data: Data, index: int, predicted: PredictedReadings) -> SensorCheck:
+    sigma = data.sigma_per_sample(index, sensor.kind)
     if not sensor.kind.mounted:
-        time, _ = manoeuvre.recording.vector(sensor.kind.value, sensor.kind.axes)
-        return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, 0.0, None)
-    time, measured = manoeuvre.recording.vector(sensor.kind.value)
+        return SensorCheck(sensor.kind, sigma, None, 0.0, None)
+    time, measured = data.measured(index, sensor.kind)
     expected = predicted.channels[sensor.kind][np.searchsorted(predicted.time, time)]
-    measured_sigma, sigma_error = _quiet_sigma(expected, measured)
+    stamps, samples = data.samples_of(index, sensor.kind)
+    between = np.stack([np.interp(stamps, time, column) for column in expected.T], axis=1)
+    measured_sigma, sigma_error = _quiet_sigma(between, samples)
     return SensorCheck(
         kind=sensor.kind,
-        sigma=sensor.noise.sigma(float(np.median(np.diff(time)))),
+        sigma=sigma,
         measured_sigma=measured_sigma,
         sigma_error=sigma_error,
         delay=_delay(time, expected, measured),

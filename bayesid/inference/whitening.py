@@ -41,7 +41,7 @@ class NoiseChannel(NamedTuple):
 
     Attributes
     ----------
-    sigma : float
+    sigma : float or (n,) array
         Standard deviation of the white noise.
     rows : (n,) integer array
         Rows of the sample grid at which the axis was sampled.
@@ -49,12 +49,55 @@ class NoiseChannel(NamedTuple):
         Filter of the samples.
     coloured : pair of float
         Standard deviation and correlation time [s] of additional, exponentially correlated noise.
+    averaged : (n,) integer array, optional
+        Number of samples of which each is the mean, by default one.
+    interval : float
+        Time between these samples [s].
     """
 
-    sigma: float
+    sigma: float | Floats
     rows: Integers
     filter: Filter
     coloured: tuple[float, float] = (0.0, 1.0)
+    averaged: Integers | None = None
+    interval: float = 0.0
+
+    def gridded(self, values: float | Floats, length: int, rest: float = 0.0) -> Floats:
+        """Return values at the rows of the channel as an array over the whole grid, ``rest`` at the other rows.
+
+        Parameters
+        ----------
+        values : float or (n,) array
+        length : int
+            Number of rows of the grid.
+        rest : float
+        """
+        whole = np.full(length, rest)
+        whole[self.rows] = values
+        return whole
+
+    def coloured_moments(self, length: int) -> tuple[Floats, Floats]:
+        """Return the moments of the coloured noise in means over blocks, relative to those in single samples.
+
+        Returns
+        -------
+        log_gain : (T,) array
+            Sum of the logarithms of two rows' gains belongs to their covariance.
+        variance : (T,) array
+        """
+        if self.averaged is None:
+            return np.zeros(length), np.ones(length)
+        step, count = self.interval / self.coloured[1], self.averaged
+        log_gain = _log_sinh(0.5 * step * count) - np.log(count) - _log_sinh(np.full(len(count), 0.5 * step))
+        kept, lost = np.exp(-step), -np.expm1(-step)
+        pairs = kept / lost + kept * np.expm1(-step * count) / (count * lost**2)
+        variance = np.where(count > 1, (1.0 + 2.0 * pairs) / count, 1.0)
+        return self.gridded(log_gain, length), self.gridded(variance, length, 1.0)
+
+
+def _log_sinh(x: Floats) -> Floats:
+    """Return the logarithm of twice the hyperbolic sine, which does not overflow."""
+    return np.asarray(x + np.log(-np.expm1(-2.0 * x)))
 
 
 @dataclass(frozen=True)
@@ -345,8 +388,9 @@ class _Covariance:
                 optimize=True,
             )
         self._blocks[0, :, range(self._channels), range(self._channels)] += np.array(
-            [[channel.sigma**2] for channel in noise.channels]
+            [channel.gridded(channel.sigma, count) ** 2 for channel in noise.channels]
         )
+        self._coloured = [channel.coloured_moments(count) for channel in noise.channels]
 
     def between(self, starts: Integers, rows: int) -> Floats:
         """Return the dense covariances (B, n, n) of some rows from each of the starts on, row by row of C channels."""
@@ -361,6 +405,9 @@ class _Covariance:
             level, memory = channel.coloured
             if level > 0.0:
                 between = np.abs(time[:, :, None] - time[:, None, :])
-                block[..., index, index] += level**2 * np.exp(-between / memory)
+                log_gain, variance = (moment[row] for moment in self._coloured[index])
+                gain = log_gain[:, :, None] + log_gain[:, None, :]
+                correlation = np.where(apart == 0, variance[:, :, None], np.exp(gain - between / memory))
+                block[..., index, index] += level**2 * correlation
         size = rows * self._channels
         return np.swapaxes(block, 2, 3).reshape(len(starts), size, size)

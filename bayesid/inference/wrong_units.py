@@ -136,7 +136,7 @@ def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings)
             kind = sensor.kind
             time, measured = posterior.data.measured(index, kind)
             expected = predicted.channels[kind][np.searchsorted(predicted.time, time)]
-            sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+            sigma = float(posterior.data.sigma(index, kind).max())
             readings = (time, _detrend(time, measured), _detrend(time, expected), sigma)
             comparisons.append(_Comparison(index, kind, f"{kind.value}.x|y|z", kind.unit, kind.slip, *readings))
     if (torque := posterior.model.torque) is not None:

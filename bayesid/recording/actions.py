@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.recording.blocks import Blocks
 from bayesid.recording.recording import Recording
 from bayesid.recording.sampled_curve import SampledCurve
 from bayesid.recording.wheel_motion import WheelMotion
@@ -46,7 +47,7 @@ class Actions:
         return cls(np.zeros(0), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 3)), spun or WheelMotion())
 
     @classmethod
-    def from_recording(cls, recording: Recording, rotors: Sequence[Wheel] = ()) -> Actions:
+    def from_recording(cls, recording: Recording, rotors: Sequence[Wheel] = (), per_second: float = 0.0) -> Actions:
         """Return the actions that a recording holds; those that it lacks are zero.
 
         Parameters
@@ -54,12 +55,21 @@ class Actions:
         recording : Recording
         rotors : sequence of Wheel, optional
             Wheels of the robot, all of which are recorded.
+        per_second : float
+            Rate above which samples are averaged over blocks [1/s]; 0 keeps every sample. A wrench that changes more
+            rarely keeps every change.
         """
-        series = [_vector(recording, family) for family in ("base_force", "base_torque")]
+        series = [_held_series(*_vector(recording, family), per_second) for family in ("base_force", "base_torque")]
         time = np.unique(np.concatenate([t for t, _ in series]))
         wrench = np.concatenate([_zero_order_hold(t, values, time) for t, values in series], axis=1)
-        spun = WheelMotion.from_recording(recording, rotors)
-        return cls(time, wrench, *_vector(recording, "wheel_momentum"), spun)
+        spun = WheelMotion.from_recording(recording, rotors, per_second)
+        return cls(time, wrench, *_averaged(*_vector(recording, "wheel_momentum"), per_second), spun)
+
+    @property
+    def changes(self) -> Floats:
+        """Times at which the wrench becomes another [s]."""
+        before = np.concatenate([np.zeros((1, 6)), self.wrench[:-1]])[: len(self.time)]
+        return self.time[(self.wrench != before).any(axis=1)]
 
     def zero_order_hold(self, time: Floats) -> Floats:
         """Return the wrench that is held at the times (T,), shape (T, 6); it is zero before the first sample."""
@@ -78,6 +88,27 @@ def _vector(recording: Recording, family: str) -> tuple[Floats, Floats]:
     if f"{family}.x" not in recording.channels:
         return np.zeros(0), np.zeros((0, 3))
     return recording.vector(family, ("x", "y", "z"))
+
+
+def _held_series(time: Floats, values: Floats, per_second: float) -> tuple[Floats, Floats]:
+    """Return a held wrench with the changes alone, or as means over blocks where it changes more often than these."""
+    blocks = Blocks.of(time, per_second)
+    if not blocks.reduced:
+        return time, values
+    changed = np.concatenate([[True], (np.diff(values, axis=0) != 0.0).any(axis=1)])
+    if changed.sum() <= len(blocks.first):
+        return time[changed], values[changed]
+    return time[blocks.first], blocks.mean(values)
+
+
+def _averaged(time: Floats, values: Floats, per_second: float) -> tuple[Floats, Floats]:
+    """Return means over blocks between the first and the last sample."""
+    blocks = Blocks.of(time, per_second)
+    if not blocks.reduced:
+        return time, values
+    inner = (blocks.time > time[0]) & (blocks.time < time[-1])
+    means = blocks.mean(values)[inner]
+    return np.concatenate([time[:1], blocks.time[inner], time[-1:]]), np.concatenate([values[:1], means, values[-1:]])
 
 
 def _zero_order_hold(times: Floats, values: Floats, at: Floats) -> Floats:

@@ -16,6 +16,7 @@ from scipy.interpolate import BPoly
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.blocks import BLOCKS_PER_SECOND
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import EXTENDED, JointSamples, SmoothedJoint
@@ -115,6 +116,7 @@ class MeasuredMotion:
         *,
         sigma: Mapping[int, float | Mapping[str, float | None] | None] | None = None,
         start: Mapping[str, float] | None = None,
+        blocks_per_second: float = BLOCKS_PER_SECOND,
     ) -> MeasuredMotion:
         """Smooth the joint channels of a recording.
 
@@ -125,6 +127,8 @@ class MeasuredMotion:
             joint. Those left out are estimated from the data.
         start : mapping of str to float, optional
             Positions at time 0 of joints that are recorded by speed only, by default zero.
+        blocks_per_second : float, optional
+            Rate above which samples are averaged over blocks [1/s]; 0 keeps every sample.
 
         Raises
         ------
@@ -134,7 +138,8 @@ class MeasuredMotion:
         check_joints(recording, robot)
         names = tuple(joint.name for joint in robot.joints)
         starts = [None if f"position.{name}" in recording.channels else (start or {}).get(name, 0.0) for name in names]
-        return cls(smooth_joints([_samples(recording, name, sigma or {}) for name in names], starts), names)
+        samples = [[one.reduced(blocks_per_second) for one in _samples(recording, name, sigma or {})] for name in names]
+        return cls(smooth_joints(samples, starts), names)
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""

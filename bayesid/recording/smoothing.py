@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as sla
@@ -21,7 +22,9 @@ from scipy.interpolate import PPoly
 from scipy.optimize import minimize, minimize_scalar
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid.recording.blocks import Blocks
 from bayesid.recording.integrated_process import IntegratedProcess, Jump, covariances_by_distance
+from bayesid.recording.lattice import lattice_step, mean_deviation
 
 __all__ = ["EXTENDED", "ORDERS", "JointSamples", "SmoothedJoint", "smooth"]
 
@@ -54,12 +57,61 @@ class JointSamples:
         Times [s] and samples.
     sigma : float, optional
         Standard deviation of the white noise of the samples, estimated where it is None.
+    means : BlockMeans, optional
+        Samples of which these are the means over blocks, in which case ``sigma`` is that of those.
     """
 
     derivative: int
     time: Floats
     value: Floats
     sigma: float | None
+    means: BlockMeans | None = None
+
+    @property
+    def every_sample(self) -> JointSamples:
+        """The samples before they were averaged."""
+        return self if self.means is None else self.means.samples
+
+    @property
+    def relative(self) -> Floats:
+        """Standard deviation of each value over that of a sample, (n,)."""
+        return np.ones(len(self.time)) if self.means is None else self.means.relative
+
+    def reduced(self, per_second: float) -> JointSamples:
+        """Return means of the samples over blocks; the samples themselves where they are no faster than these.
+
+        Parameters
+        ----------
+        per_second : float
+            Least number of blocks a second; 0 keeps every sample.
+        """
+        blocks = Blocks.of(self.time, per_second)
+        if not blocks.reduced:
+            return self
+        value, step = blocks.mean(self.value), lattice_step(self.value)
+        sigma = (step or 1.0) / math.sqrt(12.0) if self.sigma is None else self.sigma
+        apart = self.time - np.repeat(blocks.time, blocks.count)
+        moments = np.stack([blocks.mean(apart**power) for power in range(5)], axis=1)
+        means = BlockMeans(self, moments, mean_deviation(blocks, value, sigma, step))
+        return JointSamples(self.derivative, blocks.time, value, self.sigma, means)
+
+
+@dataclass(frozen=True)
+class BlockMeans:
+    """What is known of the samples of a joint that were averaged over blocks.
+
+    Parameters
+    ----------
+    samples : JointSamples
+    moments : (n, 5) array
+        Mean powers 0 to 4 of the samples' times since the mean time of their block [s^power].
+    relative : (n,) array
+        Standard deviation of each mean over that of a sample.
+    """
+
+    samples: JointSamples
+    moments: Floats
+    relative: Floats
 
 
 @dataclass(frozen=True)
@@ -182,7 +234,7 @@ class SmoothedJoint:
     @property
     def _problem(self) -> tuple[_Problem, list[float]]:
         """Normal equations, and the standard deviation of each series in scaled time."""
-        series = [_scaled(one, self.nodes, self.scale) for one in self.series]
+        series = [_Observed.of(one, self.nodes, self.scale, self.order) for one in self.series]
         problem = _Problem(self.nodes / self.scale, series, self.start, self.order, self.jumps, self.roughness)
         return problem, [
             sigma * self.scale**one.derivative for sigma, one in zip(self.sigmas, self.series, strict=True)
@@ -349,7 +401,7 @@ def _fit(
     jumps: tuple[Jump, ...],
     roughness: Floats | None,
 ) -> SmoothedJoint:
-    scaled = [_scaled(series, nodes, scale) for series in samples]
+    scaled = [_Observed.of(series, nodes, scale, order) for series in samples]
     problem = _Problem(nodes / scale, scaled, start, order, jumps, roughness)
     units = [scale**series.derivative for series in samples]
     guess = [math.log(problem.roughness() * 10.0)]
@@ -416,8 +468,37 @@ def _nearest(nodes: Floats, time: Floats) -> Integers:
     return np.where(time - nodes[right - 1] < nodes[right] - time, right - 1, right)
 
 
-def _scaled(series: JointSamples, nodes: Floats, scale: float) -> tuple[int, Integers, Floats]:
-    return series.derivative, _nearest(nodes, series.time), series.value * scale**series.derivative
+class _Observed(NamedTuple):
+    """One series of samples in scaled time."""
+
+    derivative: int
+    node: Integers  #: node to whose state each sample belongs, (n,)
+    value: Floats  #: samples, (n,)
+    row: Floats  #: derivatives of each sample in that state, (n, order)
+    relative: Floats  #: standard deviation of each sample over that of the series, (n,)
+
+    @classmethod
+    def of(cls, series: JointSamples, nodes: Floats, scale: float, order: int) -> _Observed:
+        """Return a series; of a mean over a block the state gives the Taylor polynomial."""
+        node = _nearest(nodes, series.time)
+        row = np.zeros((len(node), order))
+        row[:, series.derivative] = 1.0
+        if series.means is not None:
+            lag, moments = (series.time - nodes[node])[:, None], series.means.moments
+            for power in range(1, order - series.derivative):
+                terms = [math.comb(power, k) * moments[:, k : k + 1] * lag ** (power - k) for k in range(power + 1)]
+                row[:, series.derivative + power] = np.sum(terms, axis=0)[:, 0] / (math.factorial(power) * scale**power)
+        return cls(series.derivative, node, series.value * scale**series.derivative, row, series.relative)
+
+    def miss(self, states: Floats) -> Floats:
+        """Return samples less what the states (n, order) say of them."""
+        return self.value - (self.row * states[self.node]).sum(axis=1)
+
+    def information(self, count: int) -> Floats:
+        """Return the information on the states of all nodes for a noise of one, (count, order, order)."""
+        total = np.zeros((count, self.row.shape[1], self.row.shape[1]))
+        np.add.at(total, self.node, self.row[:, :, None] * self.row[:, None, :] / self.relative[:, None, None] ** 2)
+        return total
 
 
 class _Problem:
@@ -426,7 +507,7 @@ class _Problem:
     def __init__(
         self,
         nodes: Floats,
-        series: list[tuple[int, Integers, Floats]],
+        series: list[_Observed],
         start: float | None,
         order: int,
         jumps: Sequence[Jump],
@@ -434,7 +515,8 @@ class _Problem:
     ) -> None:
         self.series, self.count, self.order = series, len(nodes), order
         self.process = IntegratedProcess(np.diff(nodes), order, jumps, roughness)
-        spread = max(float(np.abs(values).max()) for _, _, values in series)
+        self.information = [one.information(len(nodes)) for one in series]
+        spread = max(float(np.abs(one.value).max()) for one in series)
         self.initial = np.full(order, 1.0 / (100.0 * (spread + 1e-6)) ** 2)
         self.initial_mean = np.zeros(order)
         if start is not None:
@@ -443,22 +525,22 @@ class _Problem:
     def intensity_over(self, horizon: float, sigmas: Sequence[float]) -> float:
         """Return the intensity with which the process leaves a polynomial by the noise within a number of steps."""
         intensities = []
-        for (derivative, _, _), sigma in zip(self.series, sigmas, strict=True):
-            power = self.order - derivative
+        for one, sigma in zip(self.series, sigmas, strict=True):
+            power = self.order - one.derivative
             growth = horizon ** (power - 0.5) / (math.sqrt(2 * power - 1) * math.factorial(power - 1))
-            intensities.append(sigma / growth)
+            intensities.append(sigma * float(np.median(one.relative)) / growth)
         return min(intensities)
 
     def roughness(self) -> float:
         """Return a first guess of the intensity from finite differences of the longest series."""
-        derivative, _, values = max(self.series, key=lambda series: len(series[2]))
-        rough = np.diff(values, n=self.order - derivative)
+        longest = max(self.series, key=lambda one: len(one.value))
+        rough = np.diff(longest.value, n=self.order - longest.derivative)
         return float(np.sqrt(np.mean(rough**2))) / 10.0 + 1e-12
 
     def noise_guess(self, index: int) -> float:
         """Return a first guess of the noise of one series from its fourth differences."""
-        rough = np.diff(self.series[index][2], n=4)
-        return float(np.sqrt(np.mean(rough**2) / 70.0)) / 3.0
+        one = self.series[index]
+        return float(np.sqrt(np.mean(np.diff(one.value, n=4) ** 2) / 70.0)) / (3.0 * float(np.median(one.relative)))
 
     def solve(self, intensity: float, sigmas: list[float]) -> tuple[float, Floats, Floats, float]:
         """Return the log marginal likelihood, the states (n, order), the banded factor and chi-square."""
@@ -469,8 +551,8 @@ class _Problem:
         diagonal[:-1] += lower @ self.process.transition
         diagonal[1:] += precision
         diagonal[0] += np.diag(self.initial)
-        for (derivative, node, _), sigma in zip(self.series, sigmas, strict=True):
-            np.add.at(diagonal[:, derivative, derivative], node, sigma**-2)
+        for information, sigma in zip(self.information, sigmas, strict=True):
+            diagonal += information * sigma**-2
         band = np.zeros((2 * order, self.count, order))
         for row in range(order):
             for column in range(order):
@@ -489,14 +571,16 @@ class _Problem:
             )
         increments = self.process.increments(states)
         chi2 = sum(
-            float(np.sum(((values - states[node, d]) / s) ** 2))
-            for (d, node, values), s in zip(self.series, sigmas, strict=True)
+            float(np.sum((one.miss(states) / (s * one.relative)) ** 2))
+            for one, s in zip(self.series, sigmas, strict=True)
         )
         energy = chi2 + float(np.einsum("ki,kij,kj->", increments, precision, increments))
         energy += float(np.sum(self.initial * (states[0] - self.initial_mean) ** 2))
-        counts = [len(values) for _, _, values in self.series]
         prior_logdet += float(np.log(self.initial).sum())
-        noise_logdet = sum(2.0 * n * math.log(s) for n, s in zip(counts, sigmas, strict=True))
+        noise_logdet = sum(
+            2.0 * (len(one.value) * math.log(s) + float(np.log(one.relative).sum()))
+            for one, s in zip(self.series, sigmas, strict=True)
+        )
         log_likelihood = 0.5 * (prior_logdet - noise_logdet - energy) - float(np.log(factor[0]).sum())
         return log_likelihood, states, factor, chi2
 
@@ -506,6 +590,6 @@ class _Problem:
         gradient[1:] -= force
         gradient[:-1] += np.einsum("kji,kj->ki", self.process.transition, force)
         gradient[0] -= self.initial * (states[0] - self.initial_mean)
-        for (derivative, node, values), sigma in zip(self.series, sigmas, strict=True):
-            np.add.at(gradient[:, derivative], node, (values - states[node, derivative]) / sigma**2)
+        for one, sigma in zip(self.series, sigmas, strict=True):
+            np.add.at(gradient, one.node, one.row * (one.miss(states) / (sigma * one.relative) ** 2)[:, None])
         return gradient

@@ -52,18 +52,20 @@ class WheelMotion:
         return cls(tuple(rotors), tuple(speeds.get(wheel.name, rest) for wheel in rotors))
 
     @classmethod
-    def from_recording(cls, recording: Recording, rotors: Sequence[Wheel]) -> WheelMotion:
+    def from_recording(cls, recording: Recording, rotors: Sequence[Wheel], per_second: float = 0.0) -> WheelMotion:
         """Return the motion of wheels that are all recorded; a speed that never changes is exact.
 
         Parameters
         ----------
         recording : Recording
         rotors : sequence of Wheel
+        per_second : float
+            Rate above which speeds are averaged over blocks [1/s]; 0 keeps every sample.
         """
         samples = [recording.series(f"{WHEEL_SPEED}.{wheel.name}") for wheel in rotors]
         curves: list[SmoothedJoint | SampledCurve] = [SampledCurve(t, speed[:, None]) for t, speed in samples]
         uneven = [k for k, (t, speed) in enumerate(samples) if len(t) >= FEWEST and np.ptp(speed) > 0.0]
-        smoothed = _smoothed(tuple((samples[k][0].tobytes(), samples[k][1].tobytes()) for k in uneven))
+        smoothed = _smoothed(tuple((samples[k][0].tobytes(), samples[k][1].tobytes()) for k in uneven), per_second)
         for k, joint in zip(uneven, smoothed, strict=True):
             curves[k] = joint
         return cls(tuple(rotors), tuple(curves))
@@ -107,8 +109,11 @@ class WheelMotion:
 
 
 @lru_cache(maxsize=64)  # the same recordings are asked for whenever a posterior is made of them
-def _smoothed(samples: tuple[tuple[bytes, bytes], ...]) -> tuple[SmoothedJoint, ...]:
-    series = [[JointSamples(1, *map(np.frombuffer, pair), None)] for pair in samples]
+def _smoothed(samples: tuple[tuple[bytes, bytes], ...], per_second: float) -> tuple[SmoothedJoint, ...]:
+    series = [
+        [JointSamples(1, np.frombuffer(time), np.frombuffer(speed), None).reduced(per_second)]
+        for time, speed in samples
+    ]
     return smooth_joints(series, [0.0] * len(series))
 
 

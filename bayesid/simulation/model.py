@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.blocks import BLOCKS_PER_SECOND
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing, check_mixing
@@ -41,6 +42,8 @@ class Manoeuvre:
         Standard deviation of this attitude per axis [rad]; 0 if it is exact.
     argument_of_latitude : float
         Argument of latitude at time 0 [rad].
+    blocks_per_second : float
+        Rate above which the samples of a sensor are averaged over blocks [1/s]; 0 keeps every sample.
     """
 
     recording: Recording
@@ -48,6 +51,7 @@ class Manoeuvre:
     attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     attitude_sigma: float = 0.0
     argument_of_latitude: float = 0.0
+    blocks_per_second: float = BLOCKS_PER_SECOND
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.recording import declare_family
 from bayesid.simulation.sensor_noise import (
     ARCSEC,
@@ -224,6 +224,20 @@ class SensorKind:
         """
         return readings + noise
 
+    def mean(self, readings: Floats, weight: Floats, first: Integers) -> Floats:
+        """Return weighted means of successive readings, (b, axes).
+
+        Parameters
+        ----------
+        readings : (n, axes) array
+            Readings of one sensor.
+        weight : (n,) array
+            Their weights, of which those of one mean have the sum one.
+        first : (b,) integer array
+            Number of the first reading of each mean.
+        """
+        return np.asarray(np.add.reduceat(weight[:, None] * readings, first, axis=0))
+
     def shown(self, readings: Floats, reference: Floats) -> Floats:
         """Return readings (n, axes) as figures draw them, (n, size), some relative to a reference reading (axes,).
 
@@ -324,6 +338,13 @@ class StarAttitude(SensorKind):
         scalar = readings[..., 3] - (readings[..., :3] * half).sum(axis=-1)
         turned = np.concatenate([readings[..., :3] + vector, scalar[..., None]], axis=-1)
         return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+    def mean(self, readings: Floats, weight: Floats, first: Integers) -> Floats:
+        """Return the attitudes from which the rotations to those of each mean add up to zero, to third order."""
+        begin = np.repeat(readings[first], np.diff(np.append(first, len(readings))), axis=0)
+        alike = np.where((readings * begin).sum(axis=1) < 0.0, -weight, weight)  # q and -q are one attitude
+        total = super().mean(readings, alike, first)
+        return total / np.linalg.norm(total, axis=1, keepdims=True)
 
     def shown(self, readings: Floats, reference: Floats) -> Floats:
         """Return the rotation vectors from the reference, in its axes [rad]."""

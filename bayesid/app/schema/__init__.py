@@ -27,6 +27,7 @@ from bayesid.app.schema.study_sections import (
     UnknownsSection,
     WheelSection,
 )
+from bayesid.app.schema.telemetry_section import TelemetrySection
 
 __all__ = [
     "AccelSensor",
@@ -45,6 +46,7 @@ __all__ = [
     "RobotSection",
     "SensorsSection",
     "Study",
+    "TelemetrySection",
     "UnknownsSection",
     "WheelSection",
 ]

@@ -40,7 +40,7 @@ class Study(Section):
     sensors : SensorsSection
         Sensors and their noise.
     telemetry : TelemetrySection, optional
-        Times of the recordings.
+        Times of the recordings, and how samples are used.
     joints : table of JointSection
         Joints that were recorded otherwise than the robot's file has them, by their names.
     recordings : sequence of RecordingSection

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from bayesid._io.errors import InputError
-from bayesid.app.schema.value_types import FULL_TURN, Name, Number, Positive, Section
+from bayesid.app.schema.value_types import FULL_TURN, Name, NonNegative, Number, Positive, Section, no_more_than
 
 __all__ = ["JointSection", "TelemetrySection"]
 
@@ -44,12 +44,16 @@ class JointSection(Section):
 
 
 class TelemetrySection(Section):
-    """Section ``[telemetry]``, the times of all recordings.
+    """Section ``[telemetry]``, the times of all recordings and how their samples are used.
 
     Parameters
     ----------
     time_unit : {"s", "ms", "us", "ns", "min"}, optional
         Unit of the times; with it, times counted from long before the recording, as since 1970, count from its start.
+    blocks_per_second : float
+        Rate from twice which on samples are averaged over blocks, of which there are at least so many a second [1/s];
+        0 keeps every sample.
     """
 
     time_unit: Literal["s", "ms", "us", "ns", "min"] | None = None
+    blocks_per_second: Annotated[NonNegative, no_more_than(1e5, "Blocks a second, not a length?")] = 10.0

@@ -180,4 +180,4 @@ def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
     """Return the noise of all encoders of a posterior by one factor (`noise_of`)."""
     motions = [manoeuvre.motion for manoeuvre in posterior.manoeuvres if isinstance(manoeuvre.motion, MeasuredMotion)]
     series = [(one, joint.jump_intervals) for motion in motions for joint in motion.joints for one in joint.series]
-    return noise_of([one for one, _ in series], jumps=[intervals for _, intervals in series])
+    return noise_of([one.every_sample for one, _ in series], jumps=[intervals for _, intervals in series])

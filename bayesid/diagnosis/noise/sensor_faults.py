@@ -32,6 +32,7 @@ from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.noise_changes import leaving_out, without_left_out
 from bayesid.inference.posterior import Posterior
+from bayesid.recording.lattice import ON_LATTICE, lattice_step
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Coloured, Quantised, Scaled, Sensor, SensorKind
@@ -364,7 +365,6 @@ class Quantisation(SensorFault):
 
     CERTAIN: ClassVar[float] = -1e3  #: logarithm of a p-value that stands for zero: noise never falls on a lattice
     COARSE: ClassVar[float] = 0.4  #: steps, in sigma, below which rounding does no harm
-    ON_LATTICE: ClassVar[float] = 0.02  #: largest distance from a multiple of the step, in steps
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -388,7 +388,7 @@ class Quantisation(SensorFault):
 
     def log_charge(self, fitted: FittedFault) -> float:
         """Return what the lattice says by itself: the probability that values fall on it by chance."""
-        return -float(np.log(2.0 * self.ON_LATTICE)) * fitted.posterior.samples / 3.0
+        return -float(np.log(2.0 * ON_LATTICE)) * fitted.posterior.samples / 3.0
 
     def changed(self, sensor: Sensor, sizes: Sizes) -> Sensor:
         """Return the sensor with the noise of rounding to a step per axis."""
@@ -401,16 +401,9 @@ class Quantisation(SensorFault):
         steps = []
         for axis in range(self.kind.size):
             count = len(posterior.manoeuvres)
-            values = np.concatenate([posterior.data.measured(r, self.kind)[1][:, axis] for r in range(count)])
-            distances = np.diff(np.unique(values))
-            distances = distances[distances > 1e-9 * np.abs(values).max()]
-            if len(distances) == 0:
-                return None
-            step = float(distances.min())
-            ratio = (values - values.min()) / step
-            off = np.abs(ratio - np.round(ratio)).max()
-            fine = step < self.COARSE * float(posterior.data.sigma(0, self.kind)[axis])
-            if fine or off > self.ON_LATTICE or ratio.max() < 2.0:
+            values = np.concatenate([posterior.data.samples_of(r, self.kind)[1][:, axis] for r in range(count)])
+            step = lattice_step(values)
+            if step is None or step < self.COARSE * float(posterior.data.sigma_per_sample(0, self.kind)[axis]):
                 return None
             steps.append(step)
         return np.array(steps)
