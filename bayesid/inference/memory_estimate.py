@@ -36,9 +36,10 @@ def posterior_memory(model: Model, recorded: Sequence[RecordedSamples]) -> float
     recorded : (R,) sequence of RecordedSamples
     """
     samples, channels = max(len(recording.time) for recording in recorded), model.channels.count
+    nodes = max(len(recording.nodes) for recording in recorded)
     tables = WIDTH * (1.0 + PARAMETERS * len(model.priors))
     whitening = channels * channels * (USUAL_WINDOW + max(WINDOWS) / len(recorded))  # lags of one recording at a time
-    return NUMBER * samples * len(recorded) * (COPIES * tables + whitening)
+    return NUMBER * len(recorded) * (nodes * COPIES * tables + samples * whitening)
 
 
 def refuse_large_recordings(model: Model, recorded: Sequence[RecordedSamples]) -> None:
