@@ -464,4 +464,5 @@ def test_every_effect_of_the_catalogue_is_among_them():
     shown = {cause.partition(":")[0] for case in CASES for cause in case.causes}
     shipped = {name for name, kind in known_effects().items() if kind.__module__.startswith("bayesid.")}
     wheels = {"wheel-inertia", "wheel-tilt", "wheel-latency", "wheel-imbalance"}  # tests/test_wheel_faults.py
+    wheels |= {"joint-backlash"}  # tests/test_displaced_motion.py
     assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias", *wheels}

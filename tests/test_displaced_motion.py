@@ -5,15 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
+from scipy.ndimage import gaussian_filter1d
 
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Load, Robot
-from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency, Parameter
+from bayesid.simulation.effects import Effect, EncoderOffset, JointBacklash, JointFlexibility, JointLatency, Parameter
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
@@ -138,3 +141,57 @@ def test_a_flexible_joint_is_bent_in_recordings_of_any_length():
     long_table = effect.table(carrier, Recorded(delay=-17.0), whole)[: len(short)]
     short_table = effect.table(carrier, Recorded(delay=-17.0), short)
     np.testing.assert_allclose(short_table[..., 0], long_table[..., 0], atol=0.02 * np.abs(long_table[..., 0]).max())
+
+
+def played(gap: float, joint: int) -> np.ndarray:
+    """Rate and acceleration in MuJoCo of the robot whose link coasts across the gap of one joint, (T, 6).
+
+    The torque that MuJoCo transmits without play says to which side the link is pressed. Between the sides it lacks
+    the acceleration that this torque would give it; the impact is inelastic and lasts a tenth of a second.
+    """
+    carrying = mj.join(link_body(SERVICER, "link3"), mj.Body(HEAVY, COM, INERTIA))
+    model = mj.TruthModel(SERVICER, accel_position=POINT, changed={"link3": carrying})
+    fine = np.arange(0.0, 40.001, 0.02)
+    torque = model.run(formula, fine, rate0=RATE0, step=0.05).torque[:, joint]
+    mass, mobility = np.zeros((model.model.nv, model.model.nv)), []
+    free = [*range(6), int(model.driven_v[joint])]  # the other joints are driven
+    for time in fine:
+        model.data.qpos[model.driven_q] = formula(time)[0]
+        mujoco.mj_fwdPosition(model.model, model.data)
+        mujoco.mj_fullM(model.model, model.data, mass)
+        mobility.append(np.linalg.inv(mass[np.ix_(free, free)])[6, 6])
+    lacking = -torque * mobility
+    loaded = np.abs(torque) > 1e-3 * np.abs(torque).max()
+    place = [-0.5 * gap * np.sign(torque[np.argmax(loaded)])]
+    speed = 0.0
+    for acceleration in lacking[1:]:
+        speed += 0.02 * acceleration
+        there = place[-1] + 0.02 * speed
+        if abs(there) >= 0.5 * gap:
+            there, speed = 0.5 * gap * np.sign(there), 0.0
+        place.append(there)
+    curve = make_interp_spline(fine, gaussian_filter1d(np.array(place), 0.1 / 0.02), k=5)
+
+    def moved(time: float) -> tuple[np.ndarray, ...]:
+        state = [part.copy() for part in formula(time)]
+        for order, part in enumerate(state):
+            part[joint] += float(curve(np.clip(time, 0.0, 40.0), nu=order))
+        return tuple(state)
+
+    run = model.run(moved, TIMES, rate0=RATE0, step=0.02)
+    return np.concatenate([run.rate, run.accel], axis=1)
+
+
+@pytest.mark.slow
+def test_a_link_coasts_across_the_play_of_its_joint():
+    """While it does its speed depends on the torque, not on the gap: the time is right for a gap of 1e-3 rad."""
+    shown = Recorded()
+    without = simulated(shown, mass=HEAVY)
+    with_play = simulated(shown, JointBacklash("joint2"), (1e-3,), mass=HEAVY)
+    changed, carried = played(1e-3, 1) - without, with_play - without
+    rates = changed[:, :3].ravel(), carried[:, :3].ravel()
+    assert np.corrcoef(*rates)[0, 1] > 0.85
+    # between the crossings, whose impacts are left out, the link lies at one side
+    lying = np.abs(changed[:, 3:]).max(axis=1) < 5e-5
+    assert lying.sum() > 60
+    assert np.abs(carried - changed)[lying, :3].max() < 0.1 * np.abs(changed)[lying, :3].max()

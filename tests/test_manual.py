@@ -120,7 +120,7 @@ def test_the_release_notes_have_the_version(text):
 
 
 PLANNED = {
-    *("thruster-pulses", "kicks", "thermal-snap", "rate-bias-jump", "accel-bias-jump", "joint-backlash:JOINT"),
+    *("thruster-pulses", "kicks", "thermal-snap", "rate-bias-jump", "accel-bias-jump"),
 }
 """Causes that the contract names and the catalogue does not have yet."""
 

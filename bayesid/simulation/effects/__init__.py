@@ -7,7 +7,7 @@ study files; the class states everything else that the package needs to know of 
 # the order of registration is that of the catalogue
 # isort: off
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
-from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointBacklash, JointFlexibility, JointLatency
 from bayesid.simulation.effects.systematic_faults import (
     AccelPosition,
     AttitudeMisalignment,
@@ -50,6 +50,7 @@ __all__ = [
     "FuelSlosh",
     "GravityGradient",
     "Instant",
+    "JointBacklash",
     "JointFlexibility",
     "JointFriction",
     "JointLatency",

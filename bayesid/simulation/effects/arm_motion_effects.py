@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple, Self, cast
 
 import jax.numpy as jnp
@@ -23,7 +24,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBoun
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
-__all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
+__all__ = ["EncoderOffset", "JointBacklash", "JointFlexibility", "JointLatency"]
 
 LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE = 0.1, 0.05
 """Largest plausible error of a joint's zero [rad, m]; assumed, since the eye would see more."""
@@ -263,6 +264,110 @@ class _JointCompliance(JointFlexibility):
         return jnp.stack([values[0], jnp.zeros(()), -values[1]])
 
 
+LARGEST_GAP, LARGEST_GAP_OF_SLIDE = 0.01, 1.0e-3
+"""Largest plausible play of a joint [rad, m]; assumed, since the hand would feel more."""
+
+TYPICAL_GAP = 1.0e-3
+"""Play for which the time is computed that a link takes to cross it [rad or m]."""
+
+QUICKEST, SLOWEST = 0.05, 5.0
+"""Shortest and longest time of a crossing [s]."""
+
+UNLOADED = 1.0e-3
+"""Torque through a joint relative to its largest below which it presses to neither side."""
+
+FINE = 20
+"""Instants per interval between knots at which the sign of the torque is looked at."""
+
+
+@register
+class JointBacklash(_DisplacedMotion, OnJoint):
+    """Play of a joint: the link lies half the gap off the encoder, on the side that the torque through the joint takes.
+
+    The flank that drives the link presses it from behind, so that it lags the way it is accelerated. Where the torque
+    changes its sign the link coasts from one flank to the other; how long that takes follows from the slope of the
+    torque and a gap of `TYPICAL_GAP`; the impact at the end is left out. The torque is that of the robot's bodies,
+    with the centres of the priors for unknown ones.
+    """
+
+    name = "joint-backlash"
+    summary = "The joint has play: the bodies beyond it shift by the gap where the torque through the joint reverses."
+    separated_by = (
+        "It jumps where the joint's torque changes its sign, by the same angle however fast the motion is: accelerate "
+        "and brake that joint slowly and fast."
+    )
+
+    def __init__(self, place: str = "", sigma: float = TYPICAL_GAP) -> None:
+        super().__init__(place)
+        self.parameters = (Parameter("gap", "rad", sigma),)
+
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect with the unit of its joint's position."""
+        changed = copy.copy(self)
+        unit = robot.joints[self.index_in(robot)].unit
+        changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
+        return changed
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return a play that the hand would feel."""
+        if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
+            reason = f"A slide with more than {LARGEST_GAP_OF_SLIDE:g} m of play is felt with the hand."
+            return (PhysicalBound("m", LARGEST_GAP_OF_SLIDE, reason),)
+        reason = f"A joint with more than {LARGEST_GAP:g} rad of play, half a degree, is felt with the hand."
+        return (PhysicalBound("rad", LARGEST_GAP, reason),)
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
+        """Return the displacement of the link per gap, as a central difference."""
+        index, state = self.index_in(robot), motion.evaluate(time)
+        side = _side_of_gap(_Deflection(robot, motion, index, float(time[-1])), time)
+        motions = []
+        for sign in (-1.0, 1.0):
+            changed = [np.array(values) for values in state]
+            for derivative in range(3):
+                changed[derivative][:, index] += sign * TYPICAL_GAP * side[derivative]
+            motions.append(kinematics(robot, JointState(*changed)))
+        return _Displaced(motions, np.array([[-0.5, 0.5]]) / TYPICAL_GAP)
+
+    def loads(self, values: Array) -> Array:
+        """Return the gap."""
+        return values
+
+
+def _side_of_gap(deflection: _Deflection, time: Floats) -> Floats:
+    """Return where in the gap a link lies, from -1/2 to 1/2, with two derivatives at the times (T,): shape (3, T).
+
+    Parameters
+    ----------
+    deflection : _Deflection
+        Negative torque through the joint by the inertia beyond it.
+    time : (T,) array
+        Times [s].
+    """
+    begin, end = deflection.span
+    fine = np.linspace(begin, end, FINE * max(int((end - begin) / KNOTS), 1) + 1)
+    course = deflection.derivative(fine, 0)
+    loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max())
+    side = np.zeros((3, len(time)))
+    if not len(loaded):
+        return side
+    side[0] = 0.5 * np.sign(course[loaded[0]])
+    for before, after in pairwise(loaded):
+        step = 0.5 * (np.sign(course[after]) - np.sign(course[before]))
+        if step:
+            crossing = fine[1] - fine[0], course[after - 1], course[after]
+            slope = abs(crossing[2] - crossing[1]) / crossing[0]
+            begins = fine[after] - abs(crossing[2]) / slope
+            slope = slope * np.interp(begins, *deflection.mobility)
+            # beside a motor that loses on it with this jerk, a coasting link crosses the gap in the third root of 6 g/j
+            lasts = float(np.clip((6.0 * TYPICAL_GAP / slope) ** (1.0 / 3.0), QUICKEST, SLOWEST))
+            x = np.clip((time - begins) / lasts, 0.0, 1.0)
+            across = x < 1.0
+            side[0] += step * x**3
+            side[1] += across * step / lasts * 3.0 * x**2
+            side[2] += across * step / lasts**2 * 6.0 * x
+    return side
+
+
 KNOTS = 0.5
 """Interval between the instants at which a joint's torque is computed [s]."""
 
@@ -291,6 +396,9 @@ class _Deflection:
         torque = mass[:, 6 + index, None] @ np.concatenate([base, acceleration], axis=1)
         ratio = -(torque[:, 0, 0] + drift[:, 6 + index]) / beyond
         self.spline = make_interp_spline(knots, ratio, k=DEGREE)
+        # inertia beyond the joint over that which resists the joint's torque, with the base free and others driven
+        free = np.ix_(range(len(knots)), [*range(6), 6 + index], [*range(6), 6 + index])
+        self.mobility = knots, beyond * np.linalg.inv(mass[free])[:, 6, 6]
         self.span = (knots[0], knots[-1])
 
     def derivative(self, time: Floats, order: int) -> Floats:
