@@ -26,9 +26,11 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
+from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
+from bayesid.recording.units import STANDARD_GRAVITY, UNITS
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import SensorKind, White
@@ -47,8 +49,13 @@ LOUD = 5.0
 TIMES = {"milliseconds": 1e-3, "minutes": 60.0}
 """Units of time that users give by mistake [s]."""
 
-GRAVITY = 9.80665
-"""Standard gravity [m/s2]."""
+SHORT = {"milliseconds": "ms", "minutes": "min"}
+"""Their names in a study."""
+
+GRAVITY = STANDARD_GRAVITY
+
+NEAR = 3.0
+"""Factor by which the robot as given may miss the readings where a unit is named."""
 
 ROUGH = 0.05
 """Noise over the root mean square of the readings in the fits of accelerations in m/s2 and in g."""
@@ -156,19 +163,34 @@ def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
     if not seen.loud or np.isnan(seen.factor):
         return
     if abs(seen.factor) > WRONG_UNIT:
-        raise InputError(
+        raise ConventionError(
+            _nearest_unit(seen),
             f"the readings follow the joints' motion but are {seen.factor:.3g} times what it can cause with this robot",
             file=recording.file or recording.name,
             place=f"column {seen.column}",
             remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
         )
     if abs(seen.factor) < 1.0 / WRONG_UNIT:
-        raise InputError(
+        raise ConventionError(
+            _nearest_unit(seen),
             f"the readings follow the joints' motion but are {1.0 / seen.factor:.3g} times smaller than what it causes",
             file=recording.file or recording.name,
             place=f"column {seen.column}",
             remedy=f"Give them in {seen.unit}, joint positions in radians and times in seconds, or correct the robot",
         )
+
+
+def _nearest_unit(seen: _Comparison) -> list[Convention]:
+    """Return the convention that readings are in the unit that is nearest to their factor, if one is near."""
+    family = "" if seen.kind is None else seen.kind.value
+    off = {
+        unit: abs(np.log(abs(seen.factor) * factor)) for unit, factor in UNITS.get(family, {}).items() if factor != 1.0
+    }
+    unit = min(off, key=lambda name: off[name], default="")
+    if not unit or off[unit] > np.log(NEAR):
+        return []
+    line, text = f'[sensors.{family}]\nunit = "{unit}"', f"The readings of {family} are in {unit}."
+    return [Convention(f"convention:unit:{family}", family, line, text)]
 
 
 @dataclass(frozen=True)
@@ -199,11 +221,14 @@ def _refuse_times(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
     except InputError:  # no motion in so short a time: seconds it is
         return
     if all(1.0 / WRONG_UNIT < again[comparison.column] < WRONG_UNIT for comparison in loud):
-        raise InputError(
+        line = f'[telemetry]\ntime_unit = "{SHORT[name]}"'
+        text = f"The readings follow the joints' motion only if times are {name}."
+        raise ConventionError(
+            [Convention("convention:unit:time", "time", line, text)],
             f"the readings follow the joints' motion only if times are {name}",
             file=recording.file or recording.name,
             place="column time",
-            remedy="Give times in seconds",
+            remedy=f"Give times in seconds, or state it: {'; '.join(line.splitlines())}",
         )
 
 
@@ -228,11 +253,14 @@ def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Compari
     given, other = (_misfit(posterior, compared, unit) for unit in (1.0, GRAVITY))
     if given > max(1.0, BETTER * other):
         recording = posterior.manoeuvres[small[0].index].recording
-        raise InputError(
+        line, text = '[sensors.accel]\nunit = "g"', "The readings of accel are in g, not in m/s2."
+        raise ConventionError(
+            [Convention("convention:unit:accel", "accel", line, text)],
             "the accelerations agree with the turning of the base only if they are in g",
             file=recording.file or recording.name,
             place=f"column {small[0].column}",
-            remedy="Give them in m/s2, or correct the accelerometer's position, which then is ten times too far",
+            remedy="Give them in m/s2, or correct the accelerometer's position, which then is ten times too far; or "
+            f"state it: {'; '.join(line.splitlines())}",
         )
 
 

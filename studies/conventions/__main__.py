@@ -1,0 +1,5 @@
+"""Run the study from the command line."""
+
+from studies.conventions import main
+
+main()

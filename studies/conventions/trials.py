@@ -1,0 +1,119 @@
+"""Trials: right studies with anything hidden in them, and studies with one mistake, each of MuJoCo."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from bayesid.app.convention_remedies import conventions_of, with_remedies
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.inference.conventions import find_conventions
+from studies.common.monte_carlo import Workers, run_trials
+from studies.conventions.mistakes import MISTAKES
+from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4
+from studies.truth.hidden_causes import CASES
+from studies.truth.mujoco import Manoeuvres, write_study
+from studies.truth.recordings import Sensors
+
+ROBOTS: Mapping[str, Path] = {"servicer3": SERVICER3, "servicer4": SERVICER4, "branched": BRANCHED}
+AMPLITUDES, NOISES = (0.2, 0.6, 1.2), (1e-6, 1e-5, 1e-4)  # of the joints [rad], and of all sensors [rad/s, m/s2]
+STRENGTHS = (0.3, 1.0, 5.0, 30.0)  # of what is hidden, relative to what a diagnosis sees well
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was said of one study."""
+
+    subject: str  # hidden cause of a right study, or mistake
+    wrong: bool  # whether a mistake was made
+    robot: str
+    amplitude: float
+    noise: float
+    said: tuple[str, ...]  # names of the conventions
+    expected: tuple[str, ...]
+    mended: bool  # whether no convention is wrong once the remedies are written
+    seconds: float
+
+    @property
+    def right(self) -> bool:
+        """Whether exactly what is wrong was named, and its remedy put the study right."""
+        return set(self.said) == set(self.expected) and self.mended
+
+
+def tasks(full: bool) -> list[dict[str, Any]]:
+    """Return what is tried: every hidden cause of the catalogue and beyond, and every mistake."""
+    repeats = range(6 if full else 1)
+    strengths = STRENGTHS if full else STRENGTHS[2:3]
+    right = [
+        {"case": case.name, "strength": strength, "seed": 5000 + 17 * number + repeat}
+        for number, case in enumerate(CASES)
+        for strength in strengths
+        for repeat in repeats
+    ]
+    kinds = [(robot, size, noise) for robot in ROBOTS for size in AMPLITUDES for noise in NOISES]
+    used = kinds if full else [("servicer3", 0.6, 1e-5)]
+    wrong = [
+        {"mistake": name, "robot": robot, "amplitude": size, "noise": noise, "seed": 9000 + repeat}
+        for name in MISTAKES
+        for robot, size, noise in used
+        for repeat in (range(3) if full else range(1))
+    ]
+    return right + wrong
+
+
+def trial(task: Mapping[str, Any], generator: np.random.Generator) -> dict[str, Any]:
+    """Make one study, and return what is said of its conventions."""
+    with TemporaryDirectory() as folder:
+        return asdict(_right_study(task, Path(folder)) if "case" in task else _mistaken(task, Path(folder)))
+
+
+def _right_study(task: Mapping[str, Any], folder: Path) -> Outcome:
+    case = next(case for case in CASES if case.name == task["case"])
+    study = Study.load(case.make(folder, task["seed"], task["strength"]))
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    began = time.process_time()
+    said = tuple(convention.name for convention in find_conventions(model, manoeuvres))
+    return Outcome(case.name, False, case.urdf.stem, 0.0, 0.0, said, (), True, time.process_time() - began)
+
+
+def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
+    noise, mistake = task["noise"], MISTAKES[task["mistake"]]
+    sensors = Sensors(rate_sigma=noise, accel_sigma=noise, attitude_sigma=noise, attitude_period=2.0)
+    manoeuvres = Manoeuvres(count=1, duration=60.0, amplitude=task["amplitude"])
+    draw = np.random.default_rng(task["seed"])
+    file = write_study(folder, ROBOTS[task["robot"]], draw, sensors=sensors, manoeuvres=manoeuvres).file
+    mistake.make(file)
+    began = time.process_time()
+    conventions = conventions_of(Study.load(file))
+    seconds, said = time.process_time() - began, tuple(convention.name for convention in conventions)
+    file.write_text(with_remedies(file.read_text(), [convention.remedy for convention in conventions]))
+    mended = bool(conventions) and not conventions_of(Study.load(file))
+    kind = (task["mistake"], True, task["robot"], task["amplitude"], noise)
+    return Outcome(*kind, said, mistake.names, mended, seconds)
+
+
+def run(
+    full: bool = False,
+    trials: Path | None = None,
+    workers: Workers = 1,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[Outcome]:
+    """Make all trials, those that a store does not hold yet.
+
+    Parameters
+    ----------
+    full : bool, optional
+    trials : path, optional; store of the trials
+    workers : int or Executor, optional
+    progress : callable, optional
+    """
+    made = run_trials(trial, tasks(full), trials, workers=workers, progress=progress).complete()
+    return [Outcome(**{**row, "said": tuple(row["said"]), "expected": tuple(row["expected"])}) for row in made]

@@ -1,0 +1,44 @@
+"""The study of conventions counts what is said, and hides every mistake and every cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies.common.study import Verdict
+from studies.conventions import STUDY
+from studies.conventions.mistakes import MISTAKES
+from studies.conventions.trials import Outcome, tasks, trial
+from studies.truth.hidden_causes import CASES
+
+NAMED = Outcome("sign", True, "servicer3", 0.6, 1e-5, ("convention:sign:j",), ("convention:sign:j",), True, 2.0)
+QUIET = Outcome("leak", False, "servicer3", 0.6, 1e-5, (), (), True, 0.1)
+
+
+def test_every_mistake_and_every_cause_is_tried() -> None:
+    planned = tasks(full=False)
+    assert {task["mistake"] for task in planned if "mistake" in task} == set(MISTAKES)
+    assert {task["case"] for task in planned if "case" in task} == {case.name for case in CASES}
+    assert len(tasks(full=True)) > 20 * len(planned)
+
+
+def verdicts(outcomes: Sequence[Outcome]) -> list[Verdict]:
+    return [goal.verdict for goal in STUDY.report(outcomes).goals]
+
+
+def test_goals_follow_from_the_outcomes() -> None:
+    assert verdicts([NAMED] * 4000 + [QUIET] * 9000) == [Verdict.PASS] * 3
+    alarmed = replace(QUIET, said=("convention:sign:j",), seconds=9.0)
+    assert verdicts([NAMED] * 4000 + [QUIET] * 900 + [alarmed] * 100)[0] == Verdict.FAIL
+    unmended = replace(NAMED, mended=False)
+    assert verdicts([NAMED] * 400 + [unmended] * 100 + [QUIET, alarmed])[1:] == [Verdict.FAIL, Verdict.FAIL]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, len(CASES) // 2])
+def test_a_right_study_with_a_strong_cause_is_left_in_peace(number: int) -> None:
+    made = trial(tasks(full=False)[number], np.random.default_rng(0))
+    assert made["said"] == ()
