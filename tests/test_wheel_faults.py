@@ -9,6 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bayesid import BodyPrior, InertialParameters, Manoeuvre, MeasuredMotion, Model, Recording, Robot, Wheel
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.diagnosis import diagnose
+from bayesid.diagnosis.evidence.verdict import Status
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.effects import WheelImbalance, WheelInertia, WheelLatency, WheelTilt
@@ -87,3 +91,41 @@ def test_the_force_of_an_imbalance_and_its_torque_agree_with_mujoco(tmp_path):
     rate, accel = errors(given, WheelImbalance(NAME), np.concatenate(pairs)) / errors(given)
     assert accel < 2e-3
     assert rate < 0.2
+
+
+SLOW = wheels.Slews(count=2, duration=40.0)
+FAST = wheels.Slews(count=1, duration=6.0, period=0.02, step=0.004, frequencies=(0.15, 0.4))
+"""At 50 Hz, with speeds that change enough for the lines of the wheels to be different."""
+
+
+def diagnosed(folder, slews: wheels.Slews, **faults: wheels.Fault):
+    """The diagnosis of a satellite without an arm, some of whose wheels are not as declared."""
+    made = wheels.write_slews(folder, np.random.default_rng(7), slews=slews, faults=faults, guess_spread=0.02)
+    study = Study.load(made.file)
+    model = load_model(study)
+    return diagnose(model, load_manoeuvres(study, model.robot), 1)
+
+
+@pytest.mark.slow
+def test_a_satellite_whose_wheels_are_as_declared_raises_no_alarm(tmp_path):
+    assert diagnosed(tmp_path, SLOW).verdict.status is Status.ADEQUATE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("wheel-inertia:wheel2", wheels.Fault(inertia=1.02)),
+        ("wheel-tilt:wheel2", wheels.Fault(tilt=(0.01, -0.015))),
+        ("wheel-latency:wheel2", wheels.Fault(delay=0.03)),
+    ],
+)
+def test_a_wheel_that_is_not_as_declared_is_named(tmp_path, name, fault):
+    verdict = diagnosed(tmp_path, SLOW, wheel2=fault).verdict
+    assert (verdict.status, verdict.causes) == (Status.EXPLAINED, (name,))
+
+
+@pytest.mark.slow
+def test_an_imbalance_is_named_at_its_order(tmp_path):
+    found = diagnosed(tmp_path, FAST, wheel1=wheels.Fault(static=1e-6, dynamic=5e-8))
+    assert found.verdict.causes == ("wheel-imbalance:wheel1",)

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from bayesid import BodyPrior, InertialParameters, InputError, Manoeuvre, Model, Recording, Robot, Wheel
+from bayesid.app.demo_command import _copy_demonstration
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.recording.sampled_curve import SampledCurve
@@ -80,3 +83,16 @@ def test_a_sampled_curve_integrates_and_differentiates():
     np.testing.assert_allclose(curve.at(at)[:, 0], [2.0, 2.0, 4.0, 6.0, 6.0])
     np.testing.assert_allclose(curve.at(at, -1)[:, 0], [-2.0, 0.0, 3.0, 8.0, 14.0])
     np.testing.assert_allclose(curve.at(at, 1)[:, 0], [0.0, 2.0, 2.0, 2.0, 0.0])
+
+
+def test_the_example_of_a_satellite_of_wheels_is_a_study(tmp_path):
+    hidden = _copy_demonstration("wheels", tmp_path)
+    study = Study.load(tmp_path / "study.toml")
+    model = load_model(study)
+    assert not model.robot.joints
+    assert [wheel.name for wheel in model.robot.wheels] == ["wheel1", "wheel2", "wheel3", "wheel4"]
+    assert list(hidden) == ["wheel-tilt:wheel2"]
+    (recording, _) = (manoeuvre.recording for manoeuvre in load_manoeuvres(study, model.robot))
+    assert recording.wheels == tuple(wheel.name for wheel in model.robot.wheels)
+    with pytest.raises(InputError, match="no example 'legs'"):
+        _copy_demonstration("legs", tmp_path)
