@@ -484,6 +484,7 @@ def check_shows_in(effect: Effect, hook: str) -> None:
         Recording("r", None, time, {**channels, "wheel_speed.wheel1": speed + 0.0 * time}) for speed in (20, 40)
     )
     assert effect.shows_in([fast, slow])
+    assert not effect.shows_in([fast, slow], 5.0)
     assert not effect.shows_in([fast])
 
 

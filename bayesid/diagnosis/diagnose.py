@@ -164,8 +164,9 @@ def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bo
     recordings = [manoeuvre.recording for manoeuvre in manoeuvres]
     wheels = any(recording.wheels or "wheel_momentum.x" in recording.channels for recording in recordings)
     longest = max(float(recording.time[-1]) for recording in recordings)
+    blocks = max((manoeuvre.blocks_per_second for manoeuvre in manoeuvres), key=lambda rate: rate or float("inf"))
     possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
-    shown = [effect for effect in possible if effect.shows_in(recordings)]
+    shown = [effect for effect in possible if effect.shows_in(recordings, blocks)]
     return [effect for effect in shown if len(recordings) <= FULL or not effect.per_recording]
 
 

@@ -211,5 +211,5 @@ def _study(title: str, slews: Slews, attitudes: Sequence[Array]) -> str:
     lines += [f"position = {list(slews.accel_position)}"]
     for number, attitude in enumerate(attitudes, start=1):
         lines += ["[[recordings]]", f'file = "slew-{number}.csv"', f"attitude = {attitude.tolist()}"]
-    lines += ["[unknowns]", 'bodies = ["base_link"]', ""]
+    lines += ["[telemetry]", "blocks_per_second = 0", "[unknowns]", 'bodies = ["base_link"]', ""]
     return "\n".join(lines)

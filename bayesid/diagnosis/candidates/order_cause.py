@@ -131,6 +131,7 @@ def order_spectrum(view: ResidualView, fit: Fit, effect: WheelImbalance) -> tupl
     """
     course = np.asarray(fit.operating.sample.environment.wheels)[:, :, effect.index]
     angles, speeds = course[..., 0], course[..., 1]
+    times = np.asarray(fit.operating.sample.environment.time)
     turned = max(float(np.ptp(angle)) for angle in angles)
     apart = turned / (2.0 * np.pi)
     if apart < 1.0:
@@ -139,8 +140,8 @@ def order_spectrum(view: ResidualView, fit: Fit, effect: WheelImbalance) -> tupl
     width = OVERSAMPLED * turned / count
     power = np.zeros(count // 2)
     for r, whitening in enumerate(fit.posterior.whitenings):
-        rows = whitening.rows
-        angle, speed = angles[r, rows], speeds[r, rows]
+        rows, known = fit.posterior.data.times(r)[whitening.rows], times[r]
+        angle, speed = np.interp(rows, known, angles[r]), np.interp(rows, known, speeds[r])
         place = np.rint((angle - angles[r].min()) / width).astype(int) % count
         window = np.hanning(len(rows) + 2)[1:-1]
         for channel in range(view.values.shape[2]):

@@ -163,8 +163,15 @@ class Effect:
         """
         return self
 
-    def shows_in(self, recordings: Sequence[Recording]) -> bool:
-        """Return whether recordings could show the effect, by default that they could."""
+    def shows_in(self, recordings: Sequence[Recording], blocks_per_second: float = 0.0) -> bool:
+        """Return whether recordings could show the effect, by default that they could.
+
+        Parameters
+        ----------
+        recordings : sequence of Recording
+        blocks_per_second : float
+            Rate above which their samples are averaged [1/s]; 0 keeps every sample.
+        """
         return True
 
     def at(self, instants: Sequence[float]) -> Self:

@@ -213,7 +213,8 @@ class WheelImbalance(OnWheel):
     about the common centre of mass. The dynamic one is the momentum across the axis per speed. The line has order one
     unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed that the order
     says. Seen by the sensors the line is as sharp as the smoothed speed, and what the base's rotation changes of it is
-    left out.
+    left out. Where the wheel turns faster than half the rate of the samples it is no candidate: averages over blocks
+    show no such line, and ``blocks_per_second = 0`` keeps all samples.
 
     Parameters
     ----------
@@ -275,9 +276,9 @@ class WheelImbalance(OnWheel):
         changed.order = order
         return changed
 
-    def shows_in(self, recordings: Sequence[Recording]) -> bool:
+    def shows_in(self, recordings: Sequence[Recording], blocks_per_second: float = 0.0) -> bool:
         """Return whether the line of order one lies below half the sampling rate of a sensor in some recording."""
-        return any(fastest_line(recording, self.place) < 1.0 for recording in recordings)
+        return any(fastest_line(recording, self.place, blocks_per_second) < 1.0 for recording in recordings)
 
     @property
     def entry(self) -> str:
@@ -328,7 +329,7 @@ class WheelImbalance(OnWheel):
         return speed * ahead, acceleration * ahead - speed**2 * along
 
 
-def fastest_line(recording: Recording, wheel: str) -> float:
+def fastest_line(recording: Recording, wheel: str, blocks_per_second: float = 0.0) -> float:
     """Return the frequency below which a wheel mostly turns, over half the best sampling rate of a base sensor.
 
     Parameters
@@ -336,13 +337,16 @@ def fastest_line(recording: Recording, wheel: str) -> float:
     recording : Recording
     wheel : str
         Name of the wheel.
+    blocks_per_second : float
+        Rate above which samples are averaged [1/s]; 0 keeps every sample.
     """
     sampled = [recording.interval(name) for name in ("rate.x", "accel.x") if name in recording.channels]
     column = f"wheel_speed.{wheel}"
     if not sampled or column not in recording.channels:
         return float("inf")
     speed = float(np.quantile(np.abs(recording.series(column)[1]), MOSTLY))
-    return speed * min(sampled) / np.pi
+    interval = max(min(sampled), 1.0 / blocks_per_second if blocks_per_second else 0.0)
+    return speed * interval / np.pi
 
 
 def _largest_static(robot: Robot, wheel: Wheel) -> float:
