@@ -19,8 +19,9 @@ from bayesid.diagnosis.candidates.linear_model import Remaining
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise import Outliers
 from bayesid.diagnosis.noise.noise_fault import chi2_log_sf
-from bayesid.diagnosis.outcome.gain import measure_gain
+from bayesid.diagnosis.outcome.gain import _held_out, _held_out_by_steps, folds_of, measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
+from bayesid.diagnosis.run_size import RunSize
 from bayesid.diagnosis.search.fitted_set import extended_start
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -53,6 +54,22 @@ def test_a_hidden_wheel_is_named_and_measured(wheel):
     gain = wheel.gain
     assert gain.after.chi2_per_sample < 1.1 < gain.before.chi2_per_sample
     assert gain.after.held_out.sum() > gain.before.held_out.sum()
+
+
+def test_the_size_of_a_diagnosis_is_known_before_it_runs(wheel):
+    size = RunSize.of(wheel.before.fit.posterior, wheel.effects)
+    columns = sum(item.columns.shape[1] for item in wheel.search.base.bank.signatures)
+    assert size.shared + size.local == pytest.approx(columns, rel=0.01)
+    assert size.rows == len(wheel.before.fit.residual)
+    assert 0.7 < size.memory / 1e9 < 3.0
+    assert str(size).startswith("about ")
+
+
+def test_one_step_predicts_what_refits_without_a_recording_do(wheel):
+    """Leaving out half of the data moves the mode by more than the tenth for which the step stands in."""
+    for hypothesis in (wheel.before, wheel.after):
+        refitted = _held_out(hypothesis, None)
+        np.testing.assert_allclose(_held_out_by_steps(hypothesis.fit, folds_of(2)), refitted, rtol=0.02)
 
 
 def test_refits_without_a_recording_run_on_any_executor(wheel):

@@ -133,8 +133,10 @@ def search_models(
         single = SetSearch(declared, base, enumerate_sets(base.evidence, catalogue.prior, largest=1), base.fit)
         return ModelSearch(base, alarm, (single,), _joined([single], faults), catalogue.settings)
     progress(0.5, "weighing the sets of causes")
-    first = search_sets(declared, catalogue, base)
-    base = base.without_products()
+    bare, handed_over = base.without_products(), [base]
+    del base  # the search drops its columns as soon as it has others
+    first = search_sets(declared, catalogue, handed_over.pop())
+    base = bare
     give_back_memory()
     searches = _with_faults(first, alarm, catalogue, progress)
     likeliest = max(searches, key=lambda search: search.highest)

@@ -83,8 +83,10 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
     if base is None and noise.bodies_fixed:
         base = linearise_along_data(noise.perturbed, catalogue)
     base = _with_suggested(linearise(noise.perturbed, noise.fit, catalogue) if base is None else base)
-    point, probabilities, best = *_tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue), base.fit
-    if base.bodies_fixed:
+    point, probabilities = _tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue)
+    best, bodies_fixed = base.fit, base.bodies_fixed
+    del base
+    if bodies_fixed:
         point, probabilities = _about_large_causes(point, probabilities, catalogue)
         best = point.fit
     else:
@@ -98,7 +100,9 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
             best = fit
             if abs(fit.cost - expected) < catalogue.settings.agrees:
                 break
-            point = _with_suggested(linearise(point.perturbed, best, catalogue))
+            perturbed = point.perturbed
+            del point  # with its columns, before those about the new fit are computed
+            point = _with_suggested(linearise(perturbed, best, catalogue))
             point, probabilities = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
     return SetSearch(noise, point.without_products(), probabilities, best)
 
