@@ -10,7 +10,7 @@ from bayesid.diagnosis.candidates.cause_kind import kind_of
 from bayesid.diagnosis.candidates.generic_cause import generic_columns, instants_of_each
 from bayesid.diagnosis.candidates.instant_cause import INSTANTS, InstantCause
 from bayesid.diagnosis.candidates.linear_cause import group_names
-from bayesid.diagnosis.candidates.vibration_cause import FREQUENCIES
+from bayesid.diagnosis.candidates.vibration_cause import FREQUENCIES, PAIRS, slosh_entries
 from bayesid.inference.memory_estimate import FEWER
 from bayesid.inference.posterior import Posterior
 from bayesid.robot.composite_tables import WIDTH
@@ -73,7 +73,8 @@ class RunSize:
         for effect in effects:
             amplitudes = len(effect.amplitude_quantities)
             if effect.modes_count:
-                shared[effect.label] = amplitudes * len(FREQUENCIES)
+                couplings = slosh_entries().shape[1] if effect.reach_of_swing is not None else len(PAIRS)
+                shared[effect.label] = couplings * len(FREQUENCIES)
             elif isinstance(kind_of(effect), InstantCause):
                 local += recordings * amplitudes * instants_of_each(INSTANTS, recordings)
             else:

@@ -75,7 +75,7 @@ def adapted_proposal(parameterisation: Parameterisation, optimum: Optimum, rng: 
         weights = np.exp(tempered - logsumexp(tempered))
         mean = weights @ y
         spread = (y - mean) * np.sqrt(weights)[:, None]
-        upper = np.linalg.qr(spread, mode="r")
+        upper = np.asarray(np.linalg.qr(spread, mode="r"))
         proposal = replace(proposal, mean=mean, factor=upper.T * np.sign(np.diag(upper)))
     return best if most >= LEAST * DRAWS else None
 

@@ -78,14 +78,14 @@ NEARLY = 1.05
 class Proposal(Protocol):
     """Distribution of which independence moves propose, over the coordinates in which the walkers move."""
 
-    def draw(self, count: int, rng: np.random.RandomState) -> Floats:
+    def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
         """Draw points, shape (count, n).
 
         Parameters
         ----------
         count : int
             Number of draws.
-        rng : numpy.random.RandomState
+        rng : numpy.random.Generator or numpy.random.RandomState
         """
         ...
 

@@ -130,17 +130,33 @@ class LinearResponses:
 
     def along(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
-        count = len(perturbations.reading)
-        parts = []
-        for first in range(0, count, BATCH):
-            batch = jax.tree.map(lambda x, i=first: x[i : i + BATCH], perturbations)
-            raw, offset = self._raw(batch), batch.reading
-            missing = BATCH - len(offset)
-            padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in (raw, offset)]
-            at = (self.structure, self.numbers, on_device(self.z), self.arrays)
-            parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: len(offset)])
+        return self.whitened(*self.changes(perturbations))
+
+    def changes(self, perturbations: Perturbation) -> tuple[Floats, Floats]:
+        """Return what n stacked perturbations change in the raw readings, (n, R, T, q), and beyond, (n, R, T, C)."""
+        batches = [
+            self._raw(jax.tree.map(lambda x, i=first: x[i : i + BATCH], perturbations))
+            for first in range(0, len(perturbations.reading), BATCH)
+        ]
+        return np.concatenate([np.zeros((0, *self.motion.reading.shape)), *batches]), perturbations.reading
+
+    def whitened(self, raw: Floats, offset: Floats) -> Floats:
+        """Return the derivatives of the whitened residual along such changes, shape (n, R, O, C).
+
+        Parameters
+        ----------
+        raw : (n, R, T, q) array
+        offset : (n, R, T, C) array
+        """
+        at = (self.structure, self.numbers, on_device(self.z), self.arrays)
         shape = (len(self.arrays.start), self.arrays.start.shape[1], self.arrays.weights.shape[2])
-        return np.concatenate(parts) if parts else np.zeros((0, *shape))
+        parts = [np.zeros((0, *shape))]
+        for first in range(0, len(offset), BATCH):
+            batch = [x[first : first + BATCH] for x in (raw, offset)]
+            missing = BATCH - len(batch[0])
+            padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in batch]
+            parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: BATCH - missing])
+        return np.concatenate(parts)
 
     def _raw(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the raw readings, shape (n, R, T, q)."""

@@ -356,8 +356,8 @@ def run(
         for row in many if full else ():
             file = place / f"many-{row.recordings}" / "study.toml"
             file = file if file.is_file() else write_many(row.recordings, file.parent)
-            words = ("diagnose", "--no-sample", "--no-fly-next") if row.command == "diagnose" else (row.command,)
-            on_many[row.title] = timed(row.title, words, file, 2, place / "cache-many")
+            asked = ("diagnose", "--no-sample", "--no-fly-next") if row.command == "diagnose" else (row.command,)
+            on_many[row.title] = timed(row.title, asked, file, 2, place / "cache-many")
         progress("search for manoeuvres")
         search = search_times(place / "cache-search") if full else None
         progress("candidates and nested sampling")

@@ -346,7 +346,7 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats, recordin
         time = np.asarray(instant.environment.time)[recordings]
         waves = np.cos(np.pi * np.arange(WAVES)[:, None, None] * time / ends[:, None])
         torques.append(np.einsum("krt,rtba->kartb", waves, axes).reshape(WAVES * 3, *time.shape, 3))
-    return block_diag(*torque_responses(hypothesis, *torques, recordings))
+    return block_diag(*torque_responses(hypothesis, recordings, *torques))
 
 
 def _fixed_in(

@@ -155,7 +155,7 @@ class EventCandidates:
             courses = np.stack([_courses(*row, shapes) for row in zip(time, ends, width, strict=True)], axis=1)
             about_axes = courses[:, None, ..., None] * np.eye(3)[:, None, None]  # (k, 3, R, S, 3)
             torques.append(about_axes.reshape(3 * count, *time.shape, 3))
-        blocks = torque_responses(hypothesis, *torques, recordings)
+        blocks = torque_responses(hypothesis, recordings, *torques)
         known, residual = (by_recording(fit.posterior, x)[looked_at] for x in (fit.known, fit.residual))
         apart = smooth.reshape(len(ends), -1, smooth.shape[1])
         cross = np.concatenate([part.T @ block for part, block in zip(known, blocks, strict=True)], axis=1)
@@ -285,16 +285,16 @@ class EventCandidates:
         return Taken(np.concatenate([taken.share, block.share(rest)]), np.concatenate([taken.pull, block.share(score)]))
 
 
-def torque_responses(hypothesis: Hypothesis, nodes: Floats, samples: Floats, recordings: Sequence[int]) -> Floats:
+def torque_responses(hypothesis: Hypothesis, recordings: Sequence[int], nodes: Floats, samples: Floats) -> Floats:
     """Return the responses of the whitened residual of some recordings to torques on the base, (r, N / R, k).
 
     Parameters
     ----------
     hypothesis : Hypothesis
-    nodes, samples : (k, r, S, 3) and (k, r, T, 3) arrays
-        Torques in base axes at the nodes of the integration and at the samples [N m].
     recordings : (r,) sequence of int
         Numbers of the recordings.
+    nodes, samples : (k, r, S, 3) and (k, r, T, 3) arrays
+        Torques in base axes at the nodes of the integration and at the samples [N m].
     """
     perturbed, fit = hypothesis.perturbed, hypothesis.fit
     node, sample = (np.concatenate([np.zeros_like(torque), torque], axis=-1) for torque in (nodes, samples))

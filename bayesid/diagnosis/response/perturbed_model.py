@@ -370,12 +370,22 @@ class PerturbedModel:
     def columns(
         self, effects: Iterable[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
     ) -> list[Floats]:
-        """Return derivatives of the residual in the coordinates of each effect, (N, n)."""
+        """Return derivatives of the residual in the coordinates of each effect, (N, n).
 
-        def response(item: tuple[Effect, Floats]) -> Floats:
-            return self.respond(linear_perturbation(*item, operating, self._table(item[0])), z, data)
+        What all of them change is whitened together, in full batches.
+        """
+        effects = list(effects)
+        if not effects:
+            return []
+        linear = self._about(z, data)
 
-        return in_threads(response, effects)
+        def changes(item: tuple[Effect, Floats]) -> tuple[Floats, Floats]:
+            return linear.changes(linear_perturbation(*item, operating, self._table(item[0])))
+
+        raw, offset = zip(*in_threads(changes, effects), strict=True)
+        ends = np.cumsum([len(part) for part in raw])[:-1]
+        whitened = linear.whitened(np.concatenate(raw), np.concatenate(offset))
+        return [part.reshape(len(part), -1).T for part in np.split(whitened, ends)]
 
     def respond(
         self, perturbations: Perturbation, z: Floats, data: Arrays, recordings: Sequence[int] | None = None
@@ -391,13 +401,17 @@ class PerturbedModel:
         recordings : sequence of int, optional
             Numbers of those to which pushes and residual belong, by default all.
         """
-        with ONE_AT_A_TIME:  # threads that need the same derivatives wait for the first of them
-            if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
-                self._linear = LinearResponses.about(self.posterior, z, data)
-            linear = self._linear
+        linear = self._about(z, data)
         if recordings is not None and len(recordings) < len(self.posterior.manoeuvres):
             linear = linear.part(recordings)
         return linear.along(perturbations).reshape(len(perturbations.reading), -1).T
+
+    def _about(self, z: Floats, data: Arrays) -> LinearResponses:
+        """Return the responses about a point, kept until another is asked for."""
+        with ONE_AT_A_TIME:  # threads that need the same derivatives wait for the first of them
+            if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
+                self._linear = LinearResponses.about(self.posterior, z, data)
+            return self._linear
 
     def perturbation(self, count: int, recordings: int | None = None, **parts: Floats) -> Perturbation:
         """Return ``count`` pushes of all or so many recordings with the named parts, the others zero."""
