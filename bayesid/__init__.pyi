@@ -62,25 +62,25 @@ from bayesid.inference.sampler import (
 from bayesid.recording.joint_motion import Excitation as Excitation
 from bayesid.recording.joint_motion import MeasuredMotion as MeasuredMotion
 from bayesid.recording.recording import Recording as Recording
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_disturbance as plot_disturbance,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_manoeuvre as plot_manoeuvre,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_posterior as plot_posterior,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_residuals as plot_residuals,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_robot as plot_robot,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_spectrum as plot_spectrum,
 )
-from bayesid.report.figures.plots import (
+from bayesid.report.figures import (
     plot_verdict as plot_verdict,
 )
 from bayesid.robot.body_prior import BodyPrior as BodyPrior

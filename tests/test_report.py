@@ -390,7 +390,7 @@ def test_the_bars_of_the_widths_are_the_ratios(result):
 
 def test_the_corner_plot_names_every_quantity_with_its_value(result):
     body = result.bodies["base_link"]
-    figure = figures.corner(body)
+    figure = figures.plot_posterior(body)
     assert len(figure.axes) == 55
     assert smallest_axis_text(figure) >= 8.0
     texts = [axes.texts[0].get_text() for axes in figure.axes if axes.texts]

@@ -422,7 +422,7 @@ def test_residuals_are_those_of_the_fit(biased):
 
 def test_histories_and_spectra_draw_the_residuals_before_and_after(biased):
     sides = [residuals_of(biased.before), residuals_of(biased.after)]
-    histories, spectra = figures.residual_histories(sides, 0), figures.residual_spectra(sides)
+    histories, spectra = figures.plot_residuals(sides, 0), figures.plot_spectrum(sides)
     assert len(histories.axes) == len(spectra.axes) == 6
     for place, (over_time, by_frequency) in enumerate(zip(histories.axes, spectra.axes, strict=True)):
         sensor, axis = divmod(place, 3)
@@ -444,9 +444,9 @@ def test_histories_and_spectra_draw_the_residuals_before_and_after(biased):
 
 def test_the_present_model_alone_is_not_called_before(clean):
     side = residuals_of(clean.before)
-    labels = figures.residual_histories([side], 0).axes[0].get_legend_handles_labels()[1]
+    labels = figures.plot_residuals([side], 0).axes[0].get_legend_handles_labels()[1]
     assert labels == ["samples and their running mean"]
-    assert "residual" in figures.residual_spectra([side]).axes[0].get_legend_handles_labels()[1]
+    assert "residual" in figures.plot_spectrum([side]).axes[0].get_legend_handles_labels()[1]
 
 
 def test_bars_are_the_candidates_signal_to_noise_ratios():
@@ -671,7 +671,7 @@ def test_the_cause_is_drawn_where_it_acts(biased):
     assert mark.label == "accel-bias"
     np.testing.assert_allclose(mark.point, POINT)  # where the accelerometer is
     assert mark.direction[0] > 0.95
-    robot_panel, before, after = figures.cause_picture(biased, 0).axes
+    robot_panel, before, after = figures.plot_verdict(biased, 0).axes
     assert "accel-bias" in [text.get_text() for text in robot_panel.texts]
     assert (before.get_title(), after.get_title()) == ("acceleration x, before", "acceleration x, after")
     for axes, side in ((before, biased.before), (after, biased.after)):
@@ -681,7 +681,7 @@ def test_the_cause_is_drawn_where_it_acts(biased):
 
 
 def test_no_cause_is_drawn_where_none_is_named(clean):
-    robot_panel, residual = figures.cause_picture(clean, 0).axes
+    robot_panel, residual = figures.plot_verdict(clean, 0).axes
     assert not list(robot_panel.texts)
     assert "before" not in residual.get_title()
 

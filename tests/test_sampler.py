@@ -193,6 +193,8 @@ def test_the_density_is_prior_times_likelihood(planar_case):
         posterior.log_density(z)[1, 2], rel=1e-12
     )
     assert len(posterior.names) == posterior.size
+    with pytest.raises(bayesid.InputError, match="numbers of type float32"):
+        posterior.traced_log_density(jnp.asarray(z[1, 2], dtype=jnp.float32))
 
 
 def test_the_transform_of_the_unit_cube_gives_the_prior(planar_case):

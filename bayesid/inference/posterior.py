@@ -227,7 +227,10 @@ class Posterior:
         return ndtri(np.asarray(unit, dtype=float))
 
     def traced_log_density(self, z: Array) -> Array:
-        """Return `log_density` at one point (size,), in a function that JAX traces and differentiates."""
+        """Return `log_density` at one point (size,), in a function that JAX traces and differentiates in 64 bits."""
+        if z.dtype != np.float64:
+            remedy = 'Call jax.config.update("jax_enable_x64", True) before JAX computes'
+            raise InputError(f"the coordinates are numbers of type {z.dtype}", remedy=remedy)
         r = compiled.residuals(self.structure, self.numbers, z, self.data.arrays)
         prior = 0.0 if self.flat_prior else z @ z + self.size * np.log(2.0 * np.pi)
         value = self.log_normalisation.sum() - 0.5 * (jnp.sum(r**2) + prior)

@@ -1,4 +1,7 @@
-"""Figures of the reports; every function returns a new matplotlib Figure, and none touches pyplot."""
+"""Figures of the reports; every function returns a matplotlib Figure, and none touches pyplot or its settings.
+
+Those called ``plot_`` are for users too: they take a result, and axes of the user's own.
+"""
 
 from bayesid.report.figures.design_figures import (
     base_motion,
@@ -11,43 +14,33 @@ from bayesid.report.figures.design_figures import (
 )
 from bayesid.report.figures.diagnosis_figures import (
     candidate_strengths,
-    cause_picture,
     parameter_forest,
+    plot_disturbance,
+    plot_verdict,
     wrench_histories,
     wrench_spectrum,
 )
-from bayesid.report.figures.plots import (
-    plot_disturbance,
-    plot_manoeuvre,
-    plot_posterior,
-    plot_residuals,
-    plot_robot,
-    plot_spectrum,
-    plot_verdict,
-)
 from bayesid.report.figures.posterior_figures import (
     convergence,
-    corner,
     correlations,
     direction_widths,
     displacements,
+    plot_posterior,
     prior_to_posterior,
 )
 from bayesid.report.figures.residual_figures import (
     measured_against_simulated,
-    residual_histories,
-    residual_spectra,
+    plot_residuals,
+    plot_spectrum,
     residual_statistics,
     torques_over_time,
 )
-from bayesid.report.figures.robot_figures import manoeuvre, robot_pose, robot_shapes
+from bayesid.report.figures.robot_figures import manoeuvre, plot_manoeuvre, plot_robot, robot_pose
 
 __all__ = [
     "base_motion",
     "candidate_strengths",
-    "cause_picture",
     "convergence",
-    "corner",
     "correlations",
     "covariance_ellipses",
     "direction_widths",
@@ -66,11 +59,8 @@ __all__ = [
     "plot_spectrum",
     "plot_verdict",
     "prior_to_posterior",
-    "residual_histories",
-    "residual_spectra",
     "residual_statistics",
     "robot_pose",
-    "robot_shapes",
     "tip_motion",
     "torques_over_time",
     "trajectory_bands",

@@ -14,7 +14,7 @@ from bayesid.diagnosis import Candidate, Diagnosis, DisturbingWrench, Frame, Hyp
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.diagnosis.outcome.cause_sizes import Z95, vector_size
 from bayesid.diagnosis.outcome.gain import ParameterChange
-from bayesid.diagnosis.outcome.torque_of_causes import torque_spectrum
+from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report.figures.figure_style import (
     BAND,
@@ -41,9 +41,10 @@ from bayesid.simulation.sensors import SensorKind
 __all__ = [
     "candidate_strengths",
     "cause_marks",
-    "cause_picture",
     "moved_axis",
     "parameter_forest",
+    "plot_disturbance",
+    "plot_verdict",
     "wrench_histories",
     "wrench_spectrum",
 ]
@@ -60,18 +61,19 @@ GIVEN = "#999999"
 
 
 @styled
-def cause_picture(result: Diagnosis, recording: int, axes: Any = None) -> Figure:
-    """Draw the robot with its causes at the left, and the residual of one axis before and after at the right.
+def plot_verdict(result: Diagnosis, recording: int | None = None, *, axes: Any = None) -> Figure:
+    """Draw the robot with the causes where they act, and the residual of the axis that they change most.
 
     Parameters
     ----------
     result : Diagnosis
-    recording : int
-        Recording whose residual is drawn, and at whose start the robot is drawn.
+    recording : int, optional
+        Number of the recording, by default that where the causes change most.
     axes : sequence of Axes, optional
         Panels of the robot, and of the residual before and, where causes are named, after; by default those of a new
         figure.
     """
+    recording = result.strongest_recording if recording is None else recording
     sides = result.residuals
     if axes is None:
         figure = wide_figure(2.3)
@@ -243,6 +245,21 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
     axes.set_xlabel("signal-to-noise ratio")
     axes.legend(loc="lower right")
     return figure
+
+
+def plot_disturbance(result: Diagnosis, frame: str | Frame = Frame.BASE, *, axes: Any = None) -> Figure:
+    """Draw the torque, and the force where it is seen, that would explain the residual, and that of the named causes.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    frame : str or Frame
+        Axes: ``"base"``, ``"orbit"`` or ``"inertial"``.
+    axes : array_like of Axes, optional
+        Panels to draw in, three for the torque and three for the force where it is seen; by default of a new figure.
+    """
+    cause = torque_of_causes(result.after) if result.named else None
+    return wrench_histories(result.disturbance, Frame(frame), cause, axes)
 
 
 @styled

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.directions import Direction
 from bayesid.inference.body_quantities import BODY_QUANTITIES, CONTRACTED, PRIOR_ONLY, BodyDraws, ContractionVerdict
@@ -30,7 +31,14 @@ from bayesid.report.figures.figure_style import (
 )
 from bayesid.report.numbers import format_fixed, format_number, format_quantity, format_unit
 
-__all__ = ["convergence", "corner", "correlations", "direction_widths", "displacements", "prior_to_posterior"]
+__all__ = [
+    "convergence",
+    "correlations",
+    "direction_widths",
+    "displacements",
+    "plot_posterior",
+    "prior_to_posterior",
+]
 
 REACH = 3.5  # half-width of a corner plot's axes in posterior standard deviations
 
@@ -56,17 +64,25 @@ LOOK = {
 
 
 @styled
-def corner(body: BodyDraws, axes: Any = None) -> Figure:
+def plot_posterior(result: Identification | BodyDraws, name: str | None = None, *, axes: Any = None) -> Figure:
     """Draw the joint distributions of one body's ten quantities about their means, in posterior standard deviations.
 
     The contours hold 50 % and 90 % of the draws.
 
     Parameters
     ----------
-    body : BodyDraws
+    result : Identification or BodyDraws
+    name : str, optional
+        Name of the link or load, by default the first that was identified.
     axes : (10, 10) array_like of Axes, optional
         Panels to draw in, of which those above the diagonal are hidden, by default those of a new figure.
     """
+    bodies = result.bodies if isinstance(result, Identification) else {result.name: result}
+    name = next(iter(bodies), "") if name is None else name
+    if name not in bodies:
+        remedy = f"Choose one of {', '.join(bodies)}" if bodies else "Name a body to identify"
+        raise InputError(f"no body {name!r} was identified", remedy=remedy)
+    body = bodies[name]
     mean, sd = body.mean, body.sd
     scaled = (body.values - mean) / np.where(sd > 0.0, sd, 1.0)
     count = scaled.shape[1]

@@ -12,6 +12,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from scipy import stats
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis import Diagnosis
+from bayesid.inference.identification import Identification
 from bayesid.inference.predicted_readings import SensorFit, TorqueFit
 from bayesid.inference.residual_view import ResidualSpectrum, ResidualView
 from bayesid.report.figures.figure_style import (
@@ -35,8 +37,8 @@ __all__ = [
     "SIDES",
     "draw_history",
     "measured_against_simulated",
-    "residual_histories",
-    "residual_spectra",
+    "plot_residuals",
+    "plot_spectrum",
     "residual_statistics",
     "torques_over_time",
 ]
@@ -121,19 +123,33 @@ def _paired_panels(rows: Sequence[Sequence[Curves]]) -> Figure:
     return figure
 
 
+Residuals = Identification | Diagnosis | Sequence[ResidualView]
+"""What has residuals: a result, or views of them before and, where causes are named, after."""
+
+
+def _sides(result: Residuals) -> Sequence[ResidualView]:
+    """Return the residuals before, and after where causes are named."""
+    if isinstance(result, Diagnosis):
+        return result.residuals
+    return [ResidualView.at(result.posterior, result.optimum.z)] if isinstance(result, Identification) else result
+
+
 @styled
-def residual_histories(sides: Sequence[ResidualView], recording: int, axes: Any = None) -> Figure:
-    """Draw the residuals of one recording over time, one panel per sensor axis.
+def plot_residuals(result: Residuals, recording: int | None = None, *, axes: Any = None) -> Figure:
+    """Draw the residuals of one recording over time, in standard deviations of the noise, by sensor and axis.
 
     Parameters
     ----------
-    sides : sequence of ResidualView
-        Residuals before, and after where causes are named.
-    recording : int
-        Index of the recording.
+    result : Identification, Diagnosis or sequence of ResidualView
+        Of a diagnosis that names causes, the residuals with and without them are drawn.
+    recording : int, optional
+        Number of the recording, by default the first, or that where the causes change most.
     axes : array_like of Axes, optional
         Panels to draw in, a row for each sensor, by default those of a new figure.
     """
+    if recording is None:
+        recording = result.strongest_recording if isinstance(result, Diagnosis) else 0
+    sides = _sides(result)
     kinds = sides[0].kinds
     figure, panels = sensor_panels(axes, kinds, 0.45 + 1.2 * len(kinds), sharex=True)
     for sensor, kind in enumerate(kinds):
@@ -171,16 +187,17 @@ def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:
 
 
 @styled
-def residual_spectra(sides: Sequence[ResidualView], axes: Any = None) -> Figure:
-    """Draw the spectra of the residuals, one panel per sensor axis; noise alone has level one.
+def plot_spectrum(result: Residuals, *, axes: Any = None) -> Figure:
+    """Draw the spectra of the residuals by sensor and axis; noise alone has level one.
 
     Parameters
     ----------
-    sides : sequence of ResidualView
-        Residuals before, and after where causes are named.
+    result : Identification, Diagnosis or sequence of ResidualView
+        Of a diagnosis that names causes, the spectra with and without them are drawn.
     axes : array_like of Axes, optional
         Panels to draw in, a row for each sensor, by default those of a new figure.
     """
+    sides = _sides(result)
     kinds = sides[0].kinds
     figure, panels = sensor_panels(axes, kinds, 0.5 + 1.45 * len(kinds))
     for sensor, kind in enumerate(kinds):

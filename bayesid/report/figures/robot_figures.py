@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,10 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis import Diagnosis
+from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
 from bayesid.report.figures.figure_style import PageFigure, curve_style, panels_of, shared_legend, styled, wide_figure
 from bayesid.robot.joint_state import JointState
@@ -22,9 +26,10 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.link_shapes import equivalent_box, link_shapes
 from bayesid.robot.robot import Robot
 
-__all__ = ["VIEWS", "draw_box", "draw_sticks", "manoeuvre", "robot_pose", "robot_shapes", "sticks_of"]
+__all__ = ["VIEWS", "draw_box", "draw_sticks", "manoeuvre", "plot_manoeuvre", "plot_robot", "robot_pose", "sticks_of"]
 
 
+CURVE_POINTS = 600  # number of points of a curve over time
 FACE = 0.08  # longest edge of a face that is drawn, relative to the size of the robot
 GLASS = 0.3  # opacity of a box in place of the base's shape, which may hold other links
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction of the light that shades shapes
@@ -71,6 +76,34 @@ def manoeuvre(motion: Motion, robot: Robot, time: Floats, axes: Any = None) -> F
     return figure
 
 
+class HasPosterior(Protocol):
+    """Result of a check, an identification, a simulation, a prediction or a design."""
+
+    @property
+    def posterior(self) -> Posterior:
+        """Model and manoeuvres."""
+        ...
+
+
+def plot_manoeuvre(result: Posterior | HasPosterior | Diagnosis, recording: int = 0, *, axes: Any = None) -> Figure:
+    """Draw positions and speeds of the joints in a manoeuvre.
+
+    Parameters
+    ----------
+    result : Posterior, or result that has one
+        Of a diagnosis, the recordings; of a design, the designed manoeuvre.
+    recording : int
+        Number of the manoeuvre.
+    axes : array_like of Axes, optional
+        Panels of position and speed, a row for each unit of the joints, by default those of a new figure.
+    """
+    shown = result.before.fit if isinstance(result, Diagnosis) else result
+    posterior = shown if isinstance(shown, Posterior) else shown.posterior
+    flown = posterior.manoeuvres[recording]
+    time = np.linspace(flown.recording.time[0], flown.recording.time[-1], CURVE_POINTS)
+    return manoeuvre(flown.motion, posterior.model.robot, time, axes)
+
+
 @styled
 def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
     """Draw the robot as sticks in three projections of the base frame, later instants darker.
@@ -112,23 +145,29 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
 
 
 @styled
-def robot_shapes(robot: Robot, position: Floats, ax: Any = None) -> Figure:
-    """Draw the shapes of all links in space: meshes where they are there, primitives, else equivalent boxes.
+def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, ax: Any = None) -> Figure:
+    """Draw a robot in space: its meshes where they are there, else primitives or boxes of the same inertia.
 
     Parameters
     ----------
-    robot : Robot
-    position : (joints,) array
-        Positions of the joints [rad or m].
+    robot : Robot or path of a URDF or MJCF
+    position : (joints,) array_like, optional
+        Positions of the joints [rad or m], by default zero, or the nearest that the limits allow.
     ax : Axes3D, optional
-        Axes in space, by default those of a new figure.
+        Axes to draw in, with ``projection="3d"``, by default those of a new figure.
     """
+    robot = robot if isinstance(robot, Robot) else Robot.from_urdf(robot)
+    rest = np.array([np.clip(0.0, joint.lower, joint.upper) for joint in robot.joints])
+    given = rest if position is None else np.asarray(position, dtype=float)
+    if given.shape != rest.shape:
+        names = ", ".join(joint.name for joint in robot.joints)
+        raise InputError(f"{given.size} positions for {rest.size} joints", remedy=f"Give those of {names}")
     if ax is None:
         figure = wide_figure(4.2)
         ax = figure.add_subplot(projection="3d")
     elif not hasattr(ax, "zaxis"):
         raise InputError("the axes are flat", remedy='Make them by figure.add_subplot(projection="3d")')
-    state = np.array(position, dtype=float).reshape(1, -1)
+    state = given.reshape(1, -1)
     pose = kinematics(robot, JointState(state, 0.0 * state, 0.0 * state)).pose[0]
     faces, colours, links = [], [], []
     for shape in link_shapes(robot):
