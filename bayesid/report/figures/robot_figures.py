@@ -20,7 +20,15 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
-from bayesid.report.figures.figure_style import PageFigure, curve_style, panels_of, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import (
+    WIDTH,
+    PageFigure,
+    curve_style,
+    panels_of,
+    shared_legend,
+    styled,
+    wide_figure,
+)
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.link_shapes import equivalent_box, link_shapes
@@ -163,8 +171,7 @@ def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, 
         names = ", ".join(joint.name for joint in robot.joints)
         raise InputError(f"{given.size} positions for {rest.size} joints", remedy=f"Give those of {names}")
     if ax is None:
-        figure = wide_figure(4.2)
-        ax = figure.add_subplot(projection="3d")
+        ax = PageFigure(figsize=(WIDTH, 3.8)).add_axes((0.1, 0.05, 0.8, 0.95), projection="3d")
     elif not hasattr(ax, "zaxis"):
         raise InputError("the axes are flat", remedy='Make them by figure.add_subplot(projection="3d")')
     state = given.reshape(1, -1)
