@@ -8,6 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bayesid._math.least_squares import levenberg_marquardt
+from bayesid.diagnosis.noise import Outliers
+from bayesid.diagnosis.noise.noise_fault import SensorResidual
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
+from bayesid.inference.data import RecordedSamples
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings, simulate_recordings
 from bayesid.inference.whitening import NoiseChannel
@@ -210,6 +214,43 @@ def test_a_model_predicts_the_means_of_what_it_predicts_for_every_sample(recorde
     np.testing.assert_allclose(means.residuals(z)[0, : len(measured), 3:], expected, rtol=1e-5)
     (simulated,) = simulate_recordings(means, z=z)
     assert len(simulated.time) == len(fine.time)
+
+
+@pytest.fixture(scope="module")
+def spiked(recorded) -> SimpleNamespace:
+    """The same recording with four garbled readings of the rate."""
+    recording = recorded.manoeuvre.recording
+    rate = np.array(recording.channels["rate.y"])
+    rate[[200, 480, 900, 1310]] += np.array([40.0, -25.0, 60.0, 30.0]) * SIGMA
+    channels = {**recording.channels, "rate.y": rate}
+    garbled = Recording("spiked", None, recording.time, channels)
+    return SimpleNamespace(model=recorded.model, manoeuvre=replace(recorded.manoeuvre, recording=garbled))
+
+
+def samples_of(case: SimpleNamespace) -> RecordedSamples:
+    return RecordedSamples.of(case.model, replace(case.manoeuvre, blocks_per_second=5.0))
+
+
+def test_spikes_are_in_no_mean(recorded, spiked):
+    whole, some = samples_of(recorded), samples_of(spiked)
+    assert len(whole.spikes["rate"]) == 0
+    assert np.sort(some.spikes["rate"]) == pytest.approx([25.0, 30.0, 40.0, 60.0], rel=0.15)
+    assert some.blocks["rate"].count.sum() == 1501 - 4
+    assert not np.isin(whole.blocks["rate"].stamps[[200, 480, 900, 1310]], some.blocks["rate"].stamps).any()
+    row = np.searchsorted(some.blocks["rate"].first, 480, side="right") - 1
+    kept = np.delete(np.arange(480, 490), 0)
+    readings = spiked.manoeuvre.recording.vector("rate")[1]
+    np.testing.assert_allclose(some.series[SensorKind.RATE][1][row], readings[kept].mean(axis=0), rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_spikes_at_the_full_rate_count_as_outliers(spiked):
+    posterior = posterior_of(spiked, 5.0)
+    calm, fault = SensorResidual(900.0, 900.0, [np.zeros(300)] * 3), Outliers(SensorKind.RATE)
+    assert fault.log_p_of(calm, posterior) < -1000.0
+    fitted = fault.measured(PerturbedModel(posterior).fit())
+    assert fitted.mean[0] == pytest.approx(4.0 / 1501.0, rel=0.01)
+    assert fitted.log_charge > 1000.0
 
 
 @pytest.mark.slow

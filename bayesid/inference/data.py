@@ -18,6 +18,7 @@ from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening
 from bayesid.recording.actions import Actions
 from bayesid.recording.blocks import Blocks
+from bayesid.recording.full_rate import spikes
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.lattice import lattice_step, mean_deviation
 from bayesid.recording.recording import Recording
@@ -125,6 +126,15 @@ class Data:
         kind : SensorKind
         """
         return self.manoeuvres[index].recording.vector(kind.value, kind.axes)
+
+    def spikes(self, kind: SensorKind) -> Floats:
+        """Return how far each spike of one sensor that no mean holds departs [standard deviations], all recordings.
+
+        Parameters
+        ----------
+        kind : SensorKind
+        """
+        return np.concatenate([recording.spikes.get(kind.value, np.zeros(0)) for recording in self.recorded])
 
     def left_out_times(self, index: int) -> dict[SensorKind, Floats]:
         """Return, for each sensor, the stamps of the samples that the likelihood leaves out of one recording [s]."""
@@ -276,6 +286,8 @@ class RecordedSamples:
         Samples that each reading is the mean of, by the family of the channels.
     steps : mapping of str to tuple
         Step of the lattice on which the samples of each column lie, None where on none or where nothing is reduced.
+    spikes : mapping of str to array
+        How far each sample departs that no mean over a block holds, since it is a spike [standard deviations].
     series : mapping of SensorKind to Series
         Recorded times and readings of each sensor.
     torque : Series
@@ -294,6 +306,7 @@ class RecordedSamples:
     nodes: Floats
     blocks: Mapping[str, Blocks]
     steps: Mapping[str, tuple[float | None, ...]]
+    spikes: Mapping[str, Floats]
     series: Mapping[SensorKind, Series]
     torque: Series
     torque_rows: tuple[Integers, ...]
@@ -322,10 +335,17 @@ class RecordedSamples:
         breaks = np.concatenate([Actions.from_recording(recording, (), per_second).changes, jumps])
         blocks: dict[str, Blocks] = {}
         steps: dict[str, tuple[float | None, ...]] = {}
+        departures: dict[str, Floats] = {}
         series: dict[SensorKind, Series] = {}
         for sensor in model.sensors:
             kind = sensor.kind
             stamps, values = _series(recording, kind.value, kind.axes)
+            if kind.is_difference and Blocks.of(stamps, per_second).reduced:
+                sigma = sensor.noise.sigma(float(np.median(np.diff(stamps))))
+                each = [spikes(column, float(level)) for column, level in zip(values.T, sigma, strict=True)]
+                departures[kind.value] = np.concatenate([part for _, part in each])
+                kept = ~np.any([gone for gone, _ in each], axis=0)
+                stamps, values = stamps[kept], values[kept]
             blocks[kind.value] = one = Blocks.of(stamps, per_second, breaks)
             series[kind] = one.time, kind.mean(values, one.weight_of_samples, one.first) if one.reduced else values
             steps[kind.value] = _steps(one, values) if kind.is_difference else (None,) * kind.size
@@ -342,7 +362,18 @@ class RecordedSamples:
         used = tuple(rows[moving] for moving in _moving(model, manoeuvre.motion, torque[0]))
         wheels = WheelMotion.from_recording(recording, model.robot.wheels, per_second)
         return cls(
-            manoeuvre.motion, model.sensors, model.torque, time, nodes, blocks, steps, series, torque, used, wheels
+            manoeuvre.motion,
+            model.sensors,
+            model.torque,
+            time,
+            nodes,
+            blocks,
+            steps,
+            departures,
+            series,
+            torque,
+            used,
+            wheels,
         )
 
     @property

@@ -12,6 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.data import Data
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
+from bayesid.recording.full_rate import ChannelSpectrum, channel_spectrum, spikes
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
 from bayesid.recording.suspect_readings import SuspectReadings, suspect_readings
@@ -132,6 +133,8 @@ class RecordingCheck:
         Columns of sensors that hold one number alone, while others of their sensor change.
     unused : tuple of str
         Sensors that are recorded and not declared.
+    spectra : tuple of ChannelSpectrum
+        Spectrum of every channel of sensors and joints, and what is above the rate of the blocks.
     suspects : tuple of SuspectReadings
         Readings that no sensor gives.
     """
@@ -145,11 +148,13 @@ class RecordingCheck:
     stuck: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
     suspects: tuple[SuspectReadings, ...] = ()
+    spectra: tuple[ChannelSpectrum, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on properties of the recording that need attention."""
         sentences = [f"{suspect}" for suspect in self.suspects]
+        sentences += [remark for spectrum in self.spectra for remark in spectrum.remarks]
         sentences += [
             f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
             for joint in self.joints
@@ -228,7 +233,29 @@ def _check(posterior: Posterior, index: int, predicted: PredictedReadings) -> Re
         stuck=_stuck(recording, model),
         unused=_unused(recording, model),
         suspects=tuple(suspect_readings(recording)),
+        spectra=_spectra(posterior, index),
     )
+
+
+def _spectra(posterior: Posterior, index: int) -> tuple[ChannelSpectrum, ...]:
+    """Return the spectra of the sensors' readings and of the joints' positions and speeds."""
+    data, spectra = posterior.data, []
+    for kind in posterior.model.channels.kinds:
+        if kind.is_difference:
+            (time, values), blocks = data.samples_of(index, kind), len(data.measured(index, kind)[0])
+            sigma = data.sigma_per_sample(index, kind)
+            for name, column, level in zip(kind.components, values.T, sigma, strict=True):
+                gone, _ = spikes(column, float(level))
+                gone = gone if blocks < len(time) else np.zeros_like(gone)
+                spectrum = channel_spectrum(name, time[~gone], column[~gone], blocks, float(level), int(gone.sum()))
+                spectra.append(spectrum)
+    motion = posterior.manoeuvres[index].motion
+    for name, joint in zip(motion.names, motion.joints, strict=True) if isinstance(motion, MeasuredMotion) else ():
+        for series, sigma in zip(joint.series, joint.sigmas, strict=True):
+            family, every = JOINT_FAMILIES[series.derivative], series.every_sample
+            column = f"{family}.{name}"
+            spectra.append(channel_spectrum(column, every.time, every.value, len(series.time), sigma))
+    return tuple(spectra)
 
 
 def _stuck(recording: Recording, model: Model) -> tuple[str, ...]:

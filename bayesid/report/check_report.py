@@ -100,6 +100,30 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
         ],
         "Channels of the recording.",
     )
+    averaged = [spectrum for spectrum in check.spectra if spectrum.reduced]
+    if averaged:
+        document.table(
+            ["channel", "samples:", "blocks:", "sigma above the blocks:", "declared:", "tones [Hz]", "spikes:"],
+            [
+                [
+                    spectrum.name,
+                    str(spectrum.samples),
+                    str(spectrum.blocks),
+                    format_number(spectrum.sigma, 3),
+                    format_number(spectrum.declared, 3),
+                    ", ".join(format_number(line.frequency, 4) for line in spectrum.tones) or "none",
+                    str(spectrum.spikes),
+                ]
+                for spectrum in averaged
+            ],
+            "Channels that are averaged over blocks before anything is fitted, and what is faster than these.",
+        )
+    if check.spectra:
+        document.figure(
+            figures.channel_spectra(check.spectra),
+            "Amplitude spectral density of each channel, in its unit per root hertz. Where samples are averaged over "
+            "blocks, the line is the blocks' rate; dotted lines are tones above it.",
+        )
     document.table(
         ["sensor", "unit", "declared sigma:", "sigma in quiet stretches:", "delay against the joints [s]:"],
         [

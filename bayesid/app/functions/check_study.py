@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -91,5 +92,10 @@ def _check_dict(check: RecordingCheck) -> dict[str, Any]:
     content = asdict(check)
     for entry in (*content["sensors"], *content["suspects"]):
         entry["kind"] = entry["kind"].value
+    for spectrum in content["spectra"]:  # curves are drawn in the report
+        for key in ("frequency", "density"):
+            spectrum.pop(key)
+        for key in ("sigma", "declared", "sigma_error"):
+            spectrum[key] = spectrum[key] if math.isfinite(spectrum[key]) else None
     content["warnings"] = list(check.warnings)
     return content

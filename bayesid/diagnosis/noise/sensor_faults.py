@@ -275,9 +275,12 @@ class Outliers(SensorFault):
 
     def log_p_of(self, residual: SensorResidual, posterior: Posterior) -> float:
         """Return the logarithm of the p-value of the largest sample among all."""
-        largest = max(float(np.abs(piece).max()) for piece in residual.pieces)
+        largest = max(float(np.abs(piece).max()) for piece in residual.pieces) / residual.scale
         count = sum(len(piece) for piece in residual.pieces)
-        return float(min(0.0, np.log(count) + np.log(2.0) + stats.norm.logsf(largest / residual.scale)))
+        spikes = posterior.data.spikes(self.kind)
+        if len(spikes):
+            largest, count = max(largest, float(spikes.max())), self._every_sample(posterior)
+        return float(min(0.0, np.log(count) + np.log(2.0) + stats.norm.logsf(largest)))
 
     def measured(
         self, fit: Fit, least: float = -np.inf, settings: DiagnosisSettings = DEFAULT_SETTINGS
@@ -298,9 +301,30 @@ class Outliers(SensorFault):
         if is_event(outlying, measured, settings.event_level):
             return None
         count, total = sum(map(len, outlying)), sum(map(len, measured))
+        spikes = fit.posterior.data.spikes(self.kind)
+        if len(spikes):
+            count, total = count + len(spikes), self._every_sample(fit.posterior) // self.kind.size
         fraction = count / max(total, 1)
         sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
-        return FittedFault(self, np.array([fraction]), np.array([sd]), leaving_out(fit.posterior, masks))
+        posterior = leaving_out(fit.posterior, masks)
+        gain = self._gain_of_spikes(fit.posterior, spikes, fraction) if len(spikes) else 0.0
+        return FittedFault(self, np.array([fraction]), np.array([sd]), posterior, gain)
+
+    def _every_sample(self, posterior: Posterior) -> int:
+        """Return the number of scalar samples of the sensor before any average."""
+        recordings = range(len(posterior.manoeuvres))
+        return self.kind.size * sum(len(posterior.data.samples_of(r, self.kind)[0]) for r in recordings)
+
+    def _gain_of_spikes(self, posterior: Posterior, spikes: Floats, fraction: float) -> float:
+        """Return what the fault gains in log likelihood by the spikes at the full rate, which no mean holds.
+
+        They are uniform over the range of the readings under the fault, and normal noise without it.
+        """
+        data = posterior.data
+        readings = np.concatenate([data.samples_of(r, self.kind)[1] for r in range(len(posterior.manoeuvres))])
+        width = float(np.max(np.ptp(readings, axis=0) / data.sigma_per_sample(0, self.kind)))
+        noise = 0.5 * spikes**2 + 0.5 * np.log(2.0 * np.pi)
+        return float((noise + np.log(max(fraction, 1e-9)) - np.log(max(width, 1.0))).sum())
 
     def log_charge(self, fitted: FittedFault) -> float:
         """Return the charge of the fraction, and the log density of the samples that count as outliers.

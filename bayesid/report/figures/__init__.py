@@ -29,6 +29,7 @@ from bayesid.report.figures.posterior_figures import (
     prior_to_posterior,
 )
 from bayesid.report.figures.residual_figures import (
+    channel_spectra,
     measured_against_simulated,
     plot_residuals,
     plot_spectrum,
@@ -40,6 +41,7 @@ from bayesid.report.figures.robot_figures import manoeuvre, plot_manoeuvre, plot
 __all__ = [
     "base_motion",
     "candidate_strengths",
+    "channel_spectra",
     "convergence",
     "correlations",
     "covariance_ellipses",

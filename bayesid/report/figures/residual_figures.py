@@ -16,6 +16,7 @@ from bayesid.diagnosis import Diagnosis
 from bayesid.inference.identification import Identification
 from bayesid.inference.predicted_readings import SensorFit, TorqueFit
 from bayesid.inference.residual_view import ResidualSpectrum, ResidualView
+from bayesid.recording.full_rate import ChannelSpectrum
 from bayesid.report.figures.figure_style import (
     BAND,
     COLOURS,
@@ -35,6 +36,7 @@ from bayesid.report.numbers import format_unit
 __all__ = [
     "NOISE_BAND",
     "SIDES",
+    "channel_spectra",
     "draw_history",
     "measured_against_simulated",
     "plot_residuals",
@@ -62,6 +64,24 @@ class Curves(NamedTuple):
     predicted: Floats
     residual_time: Floats
     residual: Floats
+
+
+@styled
+def channel_spectra(spectra: Sequence[ChannelSpectrum]) -> Figure:
+    """Draw the amplitude spectral density of each channel; what is right of the line is above the blocks' rate."""
+    rows = -(-len(spectra) // COLUMNS)
+    figure = wide_figure(1.3 * rows + 0.2)
+    for place, spectrum in enumerate(spectra):
+        axes = figure.add_subplot(rows, COLUMNS, place + 1)
+        axes.loglog(spectrum.frequency, spectrum.density, color=COLOURS[0], linewidth=0.6)
+        if spectrum.reduced:
+            axes.axvline(spectrum.block_rate, color=COLOURS[1], linewidth=0.8)
+        for line in spectrum.tones:
+            axes.axvline(line.frequency, color=COLOURS[1], linewidth=0.6, linestyle=":")
+        title_panel(axes, spectrum.name)
+        if place >= len(spectra) - COLUMNS:
+            axes.set_xlabel("Hz")
+    return figure
 
 
 @styled
