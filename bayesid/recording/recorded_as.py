@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from bayesid._math.arrays import Floats
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 __all__ = ["JointRecordedAs", "RecordedAs", "SensorRecordedAs", "in_axes_of_orbit"]
 
@@ -169,6 +172,8 @@ class RecordedAs:
         sign = -1.0 if convention.reflected else 1.0  # the readings are reflected by now
         gravity = np.tile(sign * np.array(convention.gravity), (int(present.sum()), 1))
         if convention.in_space:
+            from scipy.spatial.transform import Rotation  # here, as sensors import this module
+
             turned = self._turned(columns, columns["time"][present])
             mounting = Rotation.from_matrix(self.mountings.get("accel", np.eye(3)))
             gravity = (mounting.inv() * turned.inv() * mounting).apply(gravity)
@@ -178,6 +183,8 @@ class RecordedAs:
 
     def _turned(self, columns: Mapping[str, Floats], at: Floats) -> Rotation:
         """Return the rotations from base axes to those at the first time, by the rates or else by the attitudes."""
+        from scipy.spatial.transform import Rotation, Slerp
+
         if "rate.x" in columns:
             rate = np.stack([columns[f"rate.{axis}"] for axis in "xyz"], axis=1)
             present = np.isfinite(rate).all(axis=1)
@@ -212,6 +219,8 @@ def in_axes_of_orbit(time: Floats, quaternion: Floats, frame: str, start: Floats
     orbit_rate : float
         [rad/s]
     """
+    from scipy.spatial.transform import Rotation
+
     attitude = Rotation.from_quat(quaternion)
     if frame == "rotating":
         return np.asarray((Rotation.from_rotvec(np.outer(time, [0.0, 0.0, orbit_rate])) * attitude).as_quat())

@@ -16,6 +16,9 @@ from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["JointUnits", "ReadingUnits"]
 
+WORDS = {"deg/s": "degrees per second", "arcsec/s": "arcseconds per second", "mg": "milli-g", "ug": "micro-g"}
+"""Units in words, where their names are short."""
+
 
 @MistakeFamily.register
 class ReadingUnits(MistakeFamily):
@@ -40,7 +43,7 @@ def _in_unit(kind: SensorKind, unit: str, factor: float, share: float) -> Mistak
         0,
         lambda seen: seen.with_sensor(kind, factor * seen.sensors[kind].values, factor),
         lambda seen: f'[{kind.section}]\nunit = "{unit}"',
-        lambda seen: f"The readings of {kind.value} are in {unit}, not in {kind.unit}.",
+        lambda seen: f"The readings of {kind.value} are in {WORDS.get(unit, unit)}, not in {kind.unit}.",
         share,
         ("rate", "turning") if kind == SensorKind.RATE else (kind.value,),
     )
