@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tomllib
 from pathlib import Path
@@ -10,14 +11,16 @@ import numpy as np
 import pytest
 
 from bayesid import InputError, Recording
-from bayesid.app.convention_remedies import conventions_of, with_remedies
+from bayesid.app.convention_remedies import conventions_of, fixed_study, with_remedies
+from bayesid.app.diagnose_command import diagnose_study
 from bayesid.app.schema import Study
-from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
 from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.recorded_as import JointRecordedAs, RecordedAs, SensorRecordedAs
 from studies.conventions.mistakes import MISTAKES
 from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Manoeuvres, write_study
+from tests.pdf_text import PdfText
 
 QUICK = ("gyro north-east-down", "sign of joint2", "joint1 and joint2 exchanged", "accelerations with gravity")
 
@@ -117,3 +120,23 @@ def test_remedies_replace_keys_and_add_sections() -> None:
     assert content["joints"] == {"j": {"sign": -1}}
     with pytest.raises(InputError, match="no section"):
         with_remedies("", ["sign = 1"])
+
+
+@pytest.mark.slow
+def test_a_diagnosis_ends_with_the_convention_and_init_writes_its_remedy(study: Path, tmp_path: Path) -> None:
+    file, output = spoilt(study, "gyro north-east-down", tmp_path), tmp_path / "out"
+    said = " ".join(diagnose_study(Study.load(file), output, 0, None))
+    assert "north-east-down" in said
+    written = json.loads((output / "diagnosis.json").read_text())
+    assert (written["status"], written["causes"]) == ("explained", ["convention:axes:rate"])
+    assert written["conventions"][0]["remedy"] == "[sensors.rate]\nmounting = [1, 0, 0, 0]"
+    with pytest.raises(ConventionError, match="north-east-down"):
+        load_posterior(Study.load(file))
+    before = file.read_text()
+    assert "nothing was written" in " ".join(fixed_study(file, lambda question: False))
+    assert file.read_text() == before
+    assert "Wrote 1 of 1" in " ".join(fixed_study(file, lambda question: True))
+    assert conventions_of(Study.load(file)) == []
+    pages = PdfText.read(output / "report.pdf")
+    assert "Wrong conventions" in pages
+    assert "mounting = [1, 0, 0, 0]" in pages
