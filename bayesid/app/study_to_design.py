@@ -154,7 +154,13 @@ def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
         for number, name in enumerate(names if section.joints is None else section.joints, start=1)
     ]
     if not moving:
-        raise InputError("no joint is to move", place="design.joints", remedy="Name at least one joint of the URDF")
+        remedy = "Name at least one joint of the URDF"
+        if not names:
+            remedy = (
+                "The robot has none, and only joints are designed for: list planned speeds of its wheels as recordings "
+                "without readings; `bayesid identifiability` says what they would show"
+            )
+        raise InputError("no joint is to move", place="design.joints", remedy=remedy)
     start, functions = _start(robot, section), section.functions or FUNCTIONS
     if section.parameterisation == "fourier":
         return Fourier(start, moving, section.duration, functions // 2 + 1)
