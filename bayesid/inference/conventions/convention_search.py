@@ -24,6 +24,7 @@ from bayesid.recording.recorded_as import RecordedAs, SensorRecordedAs
 from bayesid.recording.recording import Recording
 from bayesid.recording.suspect_readings import suspect_readings
 from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["find_conventions", "refuse_conventions"]
 
@@ -218,9 +219,9 @@ def _without(manoeuvre: Manoeuvre, conventions: Sequence[Convention]) -> Manoeuv
 
 
 def _by_balance(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Convention]:
-    search = _Search(model, manoeuvres)
-    if not search.recorded[0].sensors and not len(search.recorded[0].attitude_time):
+    if not any(model.sensor(kind) for kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)):
         return []
+    search = _Search(model, manoeuvres)
     declared, weighed = search.run()
     if len(weighed) == 1:
         return []

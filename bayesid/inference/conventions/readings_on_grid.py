@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.actions import Actions
 from bayesid.recording.recording import Recording
@@ -20,6 +21,7 @@ __all__ = ["GridSensor", "ReadingsOnGrid"]
 
 MOST = 160  # number of instants, enough for the motion of a manoeuvre
 GAP = 8.0  # intervals of samples above which nobody knows how the base turned meanwhile
+FEWEST = 4  # number of instants below which there is no motion to speak of
 SPREAD = 2.0  # intervals of the grid from the nearest sample beyond which an instant has no reading
 
 
@@ -119,6 +121,9 @@ class ReadingsOnGrid:
         fastest = min((float(np.median(np.diff(times))) for times, _ in series.values()), default=1.0)
         every = max(1, int(np.ceil((last - first) / fastest / MOST)))
         time = np.arange(first + 0.5 * (every - 1) * fastest, last + 0.1 * fastest, every * fastest)
+        if len(time) < FEWEST:
+            problem = f"only {len(time)} instants have readings of all sensors"
+            raise InputError(problem, file=recording.file or recording.name, remedy="Record for longer")
         sensors = {}
         for sensor in model.sensors:
             if sensor.kind in (SensorKind.RATE, SensorKind.ACCEL):
