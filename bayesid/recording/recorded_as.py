@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
 
@@ -237,7 +238,7 @@ def _groups(columns: Mapping[str, Floats], family: str) -> list[list[str]]:
 def _thin(columns: dict[str, Floats], names: Sequence[str], convention: SensorRecordedAs) -> None:
     """Empty the cells of missing and of repeated readings."""
     values = np.stack([columns[name] for name in names])
-    gone = np.isin(values, convention.missing).any(axis=0)
+    gone: NDArray[np.bool_] = np.asarray(np.isin(values, convention.missing).any(axis=0))
     if convention.native_rate:
         time = columns["time"]
         present = np.isfinite(values).all(axis=0)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bayesid._math.arrays import Integers
 from studies.truth.numerics import Array
 
 Columns = dict[str, Array]
@@ -97,7 +98,7 @@ def _both(*changes: Callable[[Columns], Columns]) -> Callable[[Columns], Columns
     return change
 
 
-def _sparse(family: str, every: int, fill: Callable[[Array, Array], Array]) -> Callable[[Columns], Columns]:
+def _sparse(family: str, every: int, fill: Callable[[Integers, Array], Array]) -> Callable[[Columns], Columns]:
     """Return the change that repeats every n-th sample of a family, or draws lines between them."""
 
     def change(columns: Columns) -> Columns:
@@ -106,7 +107,7 @@ def _sparse(family: str, every: int, fill: Callable[[Array, Array], Array]) -> C
             if name.startswith(f"{family}."):
                 present = np.flatnonzero(np.isfinite(values))
                 result[name] = values.copy()
-                result[name][present] = fill(np.arange(len(present)), values[present][::every])
+                result[name][present] = fill(np.arange(len(present), dtype=int), values[present][::every])
         return result
 
     return change

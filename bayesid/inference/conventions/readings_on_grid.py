@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from bayesid._io.errors import InputError
@@ -46,7 +47,7 @@ class GridSensor:
     """
 
     values: Floats
-    present: Floats
+    present: NDArray[np.bool_]
     sigma: float
     axes: Floats
     position: Floats
@@ -250,7 +251,7 @@ def _longest_stretch(series: list[Floats]) -> tuple[float, float]:
     return float(best[0]), float(best[1])
 
 
-def _averages(times: Floats, values: Floats, grid: Floats) -> tuple[Floats, Floats, float]:
+def _averages(times: Floats, values: Floats, grid: Floats) -> tuple[Floats, NDArray[np.bool_], float]:
     """Return the averages of samples about the instants of a grid, where there are samples, and how many on average."""
     width = float(grid[1] - grid[0])
     cell = np.floor((times - grid[0]) / width + 0.5 + 1e-9).astype(int)
@@ -266,4 +267,5 @@ def _averages(times: Floats, values: Floats, grid: Floats) -> tuple[Floats, Floa
     averaged = np.stack([np.interp(grid, at, mean(samples)) for samples in values.T], axis=1)
     nearest = np.abs(at[np.clip(np.searchsorted(at, grid), 0, len(at) - 1)] - grid)
     before = np.abs(at[np.clip(np.searchsorted(at, grid) - 1, 0, len(at) - 1)] - grid)
-    return averaged, np.minimum(nearest, before) <= SPREAD * width, float(counts[filled].mean())
+    close: NDArray[np.bool_] = np.asarray(np.minimum(nearest, before) <= SPREAD * width)
+    return averaged, close, float(counts[filled].mean())
