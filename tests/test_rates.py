@@ -1,0 +1,66 @@
+"""One flight recorded at 10 and at 1,000 Hz with noise per root hertz alike."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from bayesid._math.least_squares import levenberg_marquardt
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Sensor, SensorKind, White
+from studies.truth import mujoco as mj
+from tests.conftest import PLANAR, POINT
+
+pytestmark = pytest.mark.slow
+
+END = 30.0
+FINE = 1000.0  # rate of the fast recording; the noise of the slow one is the mean of its noise over 0.1 s [Hz]
+DENSITY = 1e-5  # noise of the sensors per sample at 2 Hz
+ENCODERS = 1e-6  # and of the encoders
+BODIES = slice(0, 10)
+
+
+def flown() -> dict[str, np.ndarray]:
+    """Return what sensors and encoders read without noise at the fine rate, by MuJoCo."""
+    motion = mj.smooth_motion(2, END, seed=11, amplitude=0.3, frequencies=(0.05, 0.08), ramp=8.0)
+    time = np.arange(0.0, END + 0.001, 0.02)
+    truth = mj.TruthModel(PLANAR, accel_position=POINT).run(motion, time, rate0=(0.01, -0.02, 0.015), step=0.02)
+    fine = np.arange(0.0, END, 1.0 / FINE)
+    curves = {f"position.joint{index + 1}": truth.position[:, index] for index in range(2)}
+    curves |= {f"rate.{axis}": truth.rate[:, index] for index, axis in enumerate("xyz")}
+    curves |= {f"accel.{axis}": truth.accel[:, index] for index, axis in enumerate("xyz")}
+    return {name: CubicSpline(time, values)(fine) for name, values in curves.items()}
+
+
+def posterior_at(readings: dict[str, np.ndarray], rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return mean and standard deviation of the unknowns at a rate by Laplace's approximation."""
+    rng, fine, noise = np.random.default_rng(3), np.arange(0.0, END, 1.0 / FINE), float(np.sqrt(rate / 2.0))
+    count = round(FINE / rate)
+    time, channels = fine.reshape(-1, count).mean(axis=1), {}
+    for name, values in readings.items():
+        level = np.sqrt(FINE / 2.0) * (ENCODERS if name.startswith("position") else DENSITY)
+        error = (level * rng.normal(size=len(fine))).reshape(-1, count).mean(axis=1)
+        channels[name] = np.interp(time, fine, values) + error
+    recording = Recording("flight", None, time, channels)
+    robot = Robot.from_urdf(PLANAR).perturbed("base_link", 0.1, np.random.default_rng(1))
+    white = White(DENSITY * noise)
+    sensors = (Sensor(SensorKind.RATE, white), Sensor(SensorKind.ACCEL, white, position=POINT))
+    prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
+    moved = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODERS * noise})
+    posterior = Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, moved)])
+    start = posterior.starting_point()
+    mode = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, 1e-9, 200).x
+    slopes = posterior.jacobian(mode)
+    return mode, np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+
+
+def test_bodies_are_as_well_known_at_any_rate():
+    readings = flown()
+    (slow, sd), (fast, other) = (posterior_at(readings, rate) for rate in (10.0, FINE))
+    assert (np.abs(fast - slow) / sd)[BODIES].max() < 0.1
+    # samples at an instant and means over 0.1 s tell different things of what joints do within that time
+    np.testing.assert_allclose(other[BODIES], sd[BODIES], rtol=0.03)
