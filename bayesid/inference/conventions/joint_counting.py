@@ -29,16 +29,20 @@ class JointSign(MistakeFamily):
         """Yield each joint that moves."""
         for index, joint in enumerate(model.robot.joints):
             if np.ptp(readings.joints.position[:, index]) > MOVES:
-                yield Mistake(
-                    f"convention:sign:{joint.name}",
-                    joint.name,
-                    f"sign:{joint.name}",
-                    2,
-                    lambda seen, index=index: _counted(seen, index, -1.0, 0.0),
-                    lambda seen, name=joint.name: f'[joints."{name}"]\nsign = -1',
-                    lambda seen, name=joint.name: f"Joint {name} counts the other way than in the robot's file.",
-                    1.0 / len(model.robot.joints),
-                )
+                yield _other_way(index, joint.name, 1.0 / len(model.robot.joints))
+
+
+def _other_way(index: int, name: str, share: float) -> Mistake:
+    return Mistake(
+        f"convention:sign:{name}",
+        name,
+        f"sign:{name}",
+        2,
+        lambda seen: _counted(seen, index, -1.0, 0.0),
+        lambda seen: f'[joints."{name}"]\nsign = -1',
+        lambda seen: f"Joint {name} counts the other way than in the robot's file.",
+        share,
+    )
 
 
 @MistakeFamily.register

@@ -256,7 +256,7 @@ class BalanceProblem:
         turned = start + drift * share + pushed
         momentum = np.einsum("tij,bti->btj", seen.turned, turned)
         rate = _times(composite.inverse, momentum - seen.wheels - composite.spin)
-        result = {}
+        result: dict[str, Floats] = {}
         if (gyro := seen.sensors.get(SensorKind.RATE)) is not None:
             miss = (gyro.in_base - rate - rate_error)[:, gyro.present]
             result["rate"] = miss.reshape(len(z), -1)

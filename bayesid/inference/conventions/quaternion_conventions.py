@@ -52,32 +52,38 @@ class QuaternionConventions(MistakeFamily):
         if not len(readings.attitude_time):
             return
         for name, line, text, change in READ:
-            yield Mistake(
-                f"convention:{name}:attitude",
-                "attitude",
-                f"attitude:{name}",
-                RANK[name],
-                lambda seen, change=change: replace(seen, attitude=change(seen.attitude)),
-                lambda seen, line=line: f"[sensors.attitude]\n{line}",
-                lambda seen, text=text: f"{text}.",
-                0.3,
-                READINGS,
-            )
-        frames = {"inertial": "fixed axes other than those of the orbit at time 0"}
+            yield _read_as(name, line, text, change)
+        yield _relative_to("inertial", "fixed axes other than those of the orbit at time 0", ANY_AXES)
         if readings.orbit_rate:
-            frames["rotating"] = "axes that turn with the orbit"
-        for frame, words in frames.items():
-            yield Mistake(
-                "convention:frame:attitude",
-                "attitude",
-                "attitude:frame",
-                2,
-                lambda seen, frame=frame: _in_orbit_axes(seen, frame),
-                lambda seen, frame=frame: f'[sensors.attitude]\nframe = "{frame}"',
-                lambda seen, words=words: f"Attitudes are relative to {words}.",
-                0.2 if frame == "rotating" else ANY_AXES,
-                READINGS,
-            )
+            yield _relative_to("rotating", "axes that turn with the orbit", 0.2)
+
+
+def _read_as(name: str, line: str, text: str, change: Callable[[Floats], Floats]) -> Mistake:
+    return Mistake(
+        f"convention:{name}:attitude",
+        "attitude",
+        f"attitude:{name}",
+        RANK[name],
+        lambda seen: replace(seen, attitude=change(seen.attitude)),
+        lambda seen: f"[sensors.attitude]\n{line}",
+        lambda seen: f"{text}.",
+        0.3,
+        READINGS,
+    )
+
+
+def _relative_to(frame: str, words: str, share: float) -> Mistake:
+    return Mistake(
+        "convention:frame:attitude",
+        "attitude",
+        "attitude:frame",
+        2,
+        lambda seen: _in_orbit_axes(seen, frame),
+        lambda seen: f'[sensors.attitude]\nframe = "{frame}"',
+        lambda seen: f"Attitudes are relative to {words}.",
+        share,
+        READINGS,
+    )
 
 
 def _in_orbit_axes(readings: ReadingsOnGrid, frame: str) -> ReadingsOnGrid:
@@ -96,17 +102,21 @@ class StatedAttitude(MistakeFamily):
         if not len(readings.attitude_time):
             return
         for name, _, text, change in READ:
-            yield Mistake(
-                f"convention:{name}:attitude",
-                "recordings.attitude",
-                f"stated:{name}",
-                RANK[name],
-                lambda seen, change=change: replace(seen, start=change(seen.start)),
-                lambda seen, change=change: _stated(change(seen.start)),
-                lambda seen, text=text: f"The attitude that the study states: {text[0].lower()}{text[1:]}.",
-                0.5,
-                ("start",),
-            )
+            yield _stated_as(name, text, change)
+
+
+def _stated_as(name: str, text: str, change: Callable[[Floats], Floats]) -> Mistake:
+    return Mistake(
+        f"convention:{name}:attitude",
+        "recordings.attitude",
+        f"stated:{name}",
+        RANK[name],
+        lambda seen: replace(seen, start=change(seen.start)),
+        lambda seen: _stated(change(seen.start)),
+        lambda seen: f"The attitude that the study states: {text[0].lower()}{text[1:]}.",
+        0.5,
+        ("start",),
+    )
 
 
 def _stated(quaternion: Floats) -> str:
