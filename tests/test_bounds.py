@@ -250,6 +250,11 @@ POWERS = {  # effect -> unit -> powers of mass and of length; panels' area goes 
     "torque-bias:joint3": {"N m": (1, 2)},
     "accel-position": {"m": (0, 1)},
     "rate-bias": {"rad/s": (0, 0)},
+    "thruster-pulses": {"N": (1, 0), "N m": (1, 1)},
+    "kicks": {"N m s": (1, 2)},
+    "thermal-snap": {"N m s": (1, 2)},
+    "rate-bias-jump": {"rad/s": (0, 0)},
+    "accel-bias-jump": {"m/s2": (0, 0)},
     "encoder-offset:joint1": {"rad": (0, 0)},
 }
 
@@ -465,4 +470,5 @@ def test_every_effect_of_the_catalogue_is_among_them():
     shipped = {name for name, kind in known_effects().items() if kind.__module__.startswith("bayesid.")}
     wheels = {"wheel-inertia", "wheel-tilt", "wheel-latency", "wheel-imbalance"}  # tests/test_wheel_faults.py
     wheels |= {"joint-backlash"}  # tests/test_displaced_motion.py
-    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias", *wheels}
+    events = {"thruster-pulses", "kicks", "thermal-snap", "rate-bias-jump", "accel-bias-jump"}  # hidden by test_events
+    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias"} | wheels | events

@@ -26,7 +26,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.log_cholesky import relative
 from bayesid.robot.robot import Robot
 from bayesid.robot.wheel import Wheel
-from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, create, known_effects
+from bayesid.simulation.effects import Effect, Events, Parameter, Readings, Resonance, Wrench, create, known_effects
 from bayesid.simulation.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
@@ -179,7 +179,7 @@ SHAPES: dict[str, Callable[[Effect], Any]] = {
     "specific_force": lambda _: (3,),
     "gravity_gradient_tensor": lambda _: (3, 3),
     "modes": lambda effect: tuple((effect.modes_count, *rest) for rest in ((), (), (3,), (3,), (3, 3))),
-    "read": lambda _: Readings((12,), {"rate": (12, 3), "accel": (12, 3), "attitude": (12, 4)}, (12, 2)),
+    "read": lambda _: Readings((12,), {"rate": (12, 3), "accel": (12, 3), "attitude": (12, 4)}, (12, 2), ()),
     "friction": lambda _: (6, 2),
     "loads": lambda effect: (columns(effect),),
     "body_loads": lambda effect: (11 * columns(effect),),
@@ -262,9 +262,14 @@ def check_in_recording(effect: Effect, hook: str) -> None:
 
 
 def check_jumps(effect: Effect, hook: str) -> None:
-    """The table is the same up to the jump and another just after it."""
-    (instant,) = effect.jumps(TIMES[-1])
-    table = effect.table(ROBOT, SWING, np.array([0.0, instant, instant + 1e-9, TIMES[-1]]))
+    """The table is the same up to the jump and another just after it; without one, an event begins just after it."""
+    (when,) = effect.jumps(TIMES[-1])
+    if isinstance(effect, Events):
+        environment = instant().environment
+        begun = [float(effect.begun(environment._replace(time=when + after))[0]) for after in (0.0, 1e-9)]
+        assert begun == [0.0, 1.0]
+        return
+    table = effect.table(ROBOT, SWING, np.array([0.0, when, when + 1e-9, TIMES[-1]]))
     np.testing.assert_array_equal(table[0], table[1])
     assert not np.allclose(table[1], table[2])
     np.testing.assert_array_equal(table[2], table[3])

@@ -24,7 +24,7 @@ from bayesid.recording.lattice import lattice_step, mean_deviation
 from bayesid.recording.recording import Recording
 from bayesid.recording.wheel_motion import WheelMotion, check_wheels
 from bayesid.robot.robot import Robot
-from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.dynamics import Grid, TimeTables
 from bayesid.simulation.effects.joint_friction import STANDSTILL, JointFriction
 from bayesid.simulation.instant import Readings
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -164,23 +164,32 @@ def grids_of(
     grids = []
     for index, (manoeuvre, samples) in enumerate(zip(manoeuvres, recorded, strict=True)):
         effects = [effect.in_recording(index) for effect in model.effects]
-        grids.append(
-            build_grid(
-                model.robot,
-                tuple(prior.name for prior in model.priors),
-                manoeuvre.motion,
-                samples.nodes,
-                step,
-                orbit=model.orbit,
-                argument_of_latitude=manoeuvre.argument_of_latitude,
-                actions=Actions.from_recording(manoeuvre.recording, model.robot.wheels, manoeuvre.blocks_per_second),
-                effects=effects,
-                torques=model.torque is not None,
-                speed_errors=model.has_speed_errors,
-                jumps=[instant for effect in effects for instant in effect.jumps(float(samples.nodes[-1]))],
-            )
+        grid = build_grid(
+            model.robot,
+            tuple(prior.name for prior in model.priors),
+            manoeuvre.motion,
+            samples.nodes,
+            step,
+            orbit=model.orbit,
+            argument_of_latitude=manoeuvre.argument_of_latitude,
+            actions=Actions.from_recording(manoeuvre.recording, model.robot.wheels, manoeuvre.blocks_per_second),
+            effects=effects,
+            torques=model.torque is not None,
+            speed_errors=model.has_speed_errors,
+            jumps=[instant for effect in effects for instant in effect.jumps(float(samples.nodes[-1]))],
         )
+        grids.append(_numbered(grid, index))
     return grids
+
+
+def _numbered(grid: Grid, index: int) -> Grid:
+    """Return the grid of a recording with the recording's number in its environment."""
+
+    def numbered(tables: TimeTables) -> TimeTables:
+        number = np.full(np.shape(tables.environment.time), float(index))
+        return tables._replace(environment=tables.environment._replace(recording=number))
+
+    return grid._replace(node=numbered(grid.node), sample=numbered(grid.sample))
 
 
 def attitudes_of(manoeuvres: Sequence[Manoeuvre]) -> Floats:
@@ -216,6 +225,7 @@ def stacked(
         padded([recording.nodes for recording in recorded]),
         {kind.value: padded([recording.gridded(kind) for recording in recorded]) for kind in model.channels.kinds},
         padded([recording.gridded_torque for recording in recorded]),
+        on_device(np.arange(float(len(recorded)))),
     )
     offset = on_device(np.zeros((len(recorded), count, model.channels.count)))
     none = on_device(np.zeros(0))

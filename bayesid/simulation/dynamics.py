@@ -504,8 +504,9 @@ class System(NamedTuple):
         """Return the instant without accelerations, and the derivative of the relative momentum."""
         body, environment = given
         still = Instant(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
-        momentum, momentum_rate = self._momentum(still, state[INNER])
-        return still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum)), momentum_rate
+        momentum, _ = self._momentum(still, state[INNER])
+        instant = still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum))
+        return instant, self._momentum(instant, state[INNER])[1]
 
     def _momentum(self, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum relative to the base about the centre of mass, and its derivative without modes."""

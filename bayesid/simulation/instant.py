@@ -63,6 +63,8 @@ class Environment(NamedTuple):
         (`bayesid.recording.wheel_motion.COURSE`).
     sampled : scalar array
         One where sensors are read; zero at the nodes of the integration, between which fast lines average out.
+    recording : scalar array
+        Number of the recording, from zero.
     """
 
     time: Traceable
@@ -77,6 +79,7 @@ class Environment(NamedTuple):
     wrench: Traceable
     wheels: Traceable = np.zeros((0, 5))
     sampled: Traceable = 1.0
+    recording: Traceable = 0
 
 
 class Instant(NamedTuple):
@@ -91,7 +94,8 @@ class Instant(NamedTuple):
     attitude : (3, 3) array
         Rotation from base to orbit axes.
     rate : (3,) array
-        Angular velocity of the base [rad/s]; zero for `Effect.momentum`, from whose result it follows.
+        Angular velocity of the base [rad/s]; zero where `Effect.momentum` is asked for the momentum, from which it
+        follows, but not where it is asked for its derivative.
     rate_change, acceleration : (3,) arrays
         Derivative of the rate, and specific force at the base origin [rad/s2, m/s2]; available to
         `Effect.specific_force` only.
@@ -157,11 +161,14 @@ class Readings(NamedTuple):
         ``readings.channels["rate"]``.
     torque : (T, n) array
         Torques of all joints of the robot [N m or N]; n is 0 where no torque is measured.
+    recording : scalar array
+        Number of the recording, from zero.
     """
 
     time: Array
     channels: dict[str, Array]
     torque: Array
+    recording: Traceable = 0
 
     def __getattr__(self, family: str) -> Array:
         """Return the readings of one sensor by the family of its channels."""

@@ -258,7 +258,7 @@ class Simulator:
     ) -> Readings:
         """Return the readings of one recording with the faults and friction that effects add."""
         channels = {kind.value: reading for kind, reading in zip(self.channels.kinds, raw, strict=True)}
-        readings = Readings(grid.sample.environment.time, channels, torque)
+        readings = Readings(grid.sample.environment.time, channels, torque, grid.sample.environment.recording[0])
         for effect, parameters in zip(self.effects(constants), values.effects, strict=True):
             readings = effect.read(parameters, readings)
             if self.torques and effect.uses("friction"):

@@ -157,7 +157,8 @@ def time_tables(
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
     state = none if orbit is None else orbit.state(time, argument_of_latitude)
     momentum, torque = actions.wheels(time)
-    known_actions = np.zeros((len(time), 6)), actions.spun.courses(time), np.ones(len(time))
+    number = np.zeros(len(time))
+    known_actions = np.zeros((len(time), 6)), actions.spun.courses(time), np.ones(len(time)), number
     environment = Environment(time, *state, momentum, torque, *known_actions)
     xp = namespace(known, *(table for _, table in tables))
     coefficients = xp.concatenate([np.zeros((len(time), WIDTH, 0)), *(table for _, table in tables)], axis=2)

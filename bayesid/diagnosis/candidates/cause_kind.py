@@ -55,6 +55,8 @@ class CauseKind:
         Whether its causes have a single form, so that a set of them is fitted in its amplitudes.
     weighed_by_fits : bool
         Whether the evidence of its causes is corrected by fits, since that of their signatures is not good enough.
+    linearised_beside : bool
+        Whether sets with its causes are linearised about the fit of the others in them.
     summary, advice, statement : str
         Of a cause that is no effect: what it is, which manoeuvre brings it out, and how a study states it.
     """
@@ -62,6 +64,7 @@ class CauseKind:
     name: ClassVar[str]
     one_form: ClassVar[bool] = False
     weighed_by_fits: ClassVar[bool] = False
+    linearised_beside: ClassVar[bool] = False
     summary: ClassVar[str] = ""
     advice: ClassVar[str] = ""
     statement: ClassVar[str] = ""

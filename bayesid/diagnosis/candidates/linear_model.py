@@ -22,6 +22,7 @@ from bayesid.diagnosis.response.present_fit import with_bodies_held
 from bayesid.diagnosis.settings import FULL
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import rows_of
+from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Fitted", "Linearisation", "Remaining", "SignatureBank", "SignatureProducts", "Signatures"]
 
@@ -44,6 +45,8 @@ class Signatures:
         Instant of a jump in each recording [s], infinite where it does not jump.
     order : float, optional
         Order of a line: its speed over that of a wheel.
+    effect : Effect, optional
+        The effect in this form, of a cause that has a shape.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Signatures:
     tone: tuple[float, float] | None = None
     instants: tuple[float, ...] | None = None
     order: float | None = None
+    effect: Effect | None = None
 
 
 @dataclass(frozen=True)

@@ -111,13 +111,16 @@ def _tuned(
     point: Linearisation, probabilities: SetProbabilities, catalogue: Catalogue
 ) -> tuple[Linearisation, SetProbabilities]:
     """Resolve plausible forms between those of the grid, such as frequencies of vibrations and instants of a jump."""
+    shaped = False
     for kind in cause_kinds():
         refined = kind.refined(
             point, probabilities, kind.of(catalogue.effects), catalogue.bounds, catalogue.settings.plausible
         )
-        if refined is not point:
-            point, probabilities = refined, enumerate_sets(refined.evidence, catalogue.prior)
-    return point, probabilities
+        if refined is not point and not kind.linearised_beside:
+            probabilities = enumerate_sets(refined.evidence, catalogue.prior)
+        shaped = shaped or (refined is not point and kind.linearised_beside)
+        point = refined
+    return point, enumerate_sets(point.evidence, catalogue.prior) if shaped else probabilities
 
 
 def _about_large_causes(
@@ -186,10 +189,15 @@ def _with_suggested(point: Linearisation) -> Linearisation:
 
 
 def _best_known(probabilities: SetProbabilities, catalogue: Catalogue) -> tuple[str, ...]:
-    """Return the most probable set that names all of its causes; none where one of them has several forms."""
+    """Return the most probable set that names all of its causes, but for those that it is linearised beside.
+
+    None where one of the others has several forms.
+    """
     best = next(
         (cause_set.causes for cause_set in probabilities.sets if cause_set.causes and cause_set.generic is None), ()
     )
+    beside = {effect.label for effect in catalogue.effects if kind_of(effect).linearised_beside}
+    best = tuple(name for name in best if name not in beside)
     return best if all(kind_of(effect).one_form for effect in catalogue.effects if effect.label in best) else ()
 
 

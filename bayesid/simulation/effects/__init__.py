@@ -19,6 +19,7 @@ from bayesid.simulation.effects.systematic_faults import (
     SensorMisalignment,
     SensorScale,
 )
+from bayesid.simulation.effects.bias_jump import AccelBiasJump, RateBiasJump
 from bayesid.simulation.effects.effect import Effect, Situation, bounds_by_label
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
@@ -32,6 +33,10 @@ from bayesid.simulation.effects.environment_effects import (
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
 from bayesid.simulation.effects.mass_shift import MassShift
+from bayesid.simulation.effects.thruster_pulses import PulseTrain, ThrusterPulses
+from bayesid.simulation.effects.events import Event, Events
+from bayesid.simulation.effects.kicks import Kicks
+from bayesid.simulation.effects.thermal_snap import ThermalSnap
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.wheel_history import WheelHistory
@@ -41,11 +46,14 @@ from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wren
 # isort: on
 
 __all__ = [
+    "AccelBiasJump",
     "AccelPosition",
     "AerodynamicDrag",
     "AttitudeMisalignment",
     "Effect",
     "EncoderOffset",
+    "Event",
+    "Events",
     "FlexibleAppendage",
     "FuelSlosh",
     "GravityGradient",
@@ -54,6 +62,7 @@ __all__ = [
     "JointFlexibility",
     "JointFriction",
     "JointLatency",
+    "Kicks",
     "LinkInertia",
     "MagneticDipole",
     "MassShift",
@@ -62,7 +71,9 @@ __all__ = [
     "Payload",
     "PhysicalBound",
     "Prior",
+    "PulseTrain",
     "Quantity",
+    "RateBiasJump",
     "Readings",
     "Resonance",
     "RotationalDrag",
@@ -75,7 +86,9 @@ __all__ = [
     "Situation",
     "SolarPressure",
     "SystematicFault",
+    "ThermalSnap",
     "ThrusterLeak",
+    "ThrusterPulses",
     "TorqueBias",
     "WheelHistory",
     "WheelImbalance",

@@ -1,0 +1,318 @@
+"""Causes with a shape, such as instants, decays or a period: proposed in Gram space, then tuned with their own columns.
+
+The bank holds a few forms, so that the cause is weighed and its power is known. Where something is there, the best
+shape beside each of the most probable sets is proposed from the cosines of the generic candidates
+(`bayesid.diagnosis.candidates.courses`), tuned by exact signatures, and added as one more form with the share of the
+prior of the shape that the data leave: Laplace's approximation in its numbers (L. Tierney and J. B. Kadane, Accurate
+approximations for posterior moments and marginal densities, JASA 81, 1986).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from bayesid._math.arrays import Floats, log_sum
+from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseAmplitude, CauseKind
+from bayesid.diagnosis.candidates.courses import half_chi2
+from bayesid.diagnosis.candidates.linear_model import Linearisation, Remaining, SignatureBank, Signatures
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.inference.residual_view import by_recording
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound, Quantity
+
+__all__ = ["ShapeProposal", "ShapedCause"]
+
+SHARE = 0.5
+"""Prior probability of tuned shapes; the rest is that of the forms of the bank."""
+
+COMPANIES = 3
+"""Sets of other causes, none among them, beside which shapes are proposed where something generic gains there."""
+
+WORTH = 6.0
+"""Nats that a proposal must earn beyond its prior to be tuned: what a cause has to earn to be named is 8."""
+
+LOST = 0.2
+"""Share of what a shape gains that the cosines may lose, being too slow for it."""
+
+ROUNDS, NARROWER, STEPS = 5, 3.0, (-1.0, -0.5, 0.5, 1.0)
+"""Rounds of the tuning, each with a reach so many times smaller, and the steps that are tried of each number."""
+
+SIZES = 4.0 ** np.arange(6)
+"""Distances relative to the last reach at which it is measured how well the data know a number."""
+
+POINTS, WIDENED = 8, 4.0
+"""Values on either side of a tuned one by which its error is measured, and the factor by which a short reach grows."""
+
+
+@dataclass(frozen=True)
+class ShapeProposal:
+    """A shape that Gram space proposes.
+
+    Attributes
+    ----------
+    effect : Effect
+        With the shape.
+    gain : float
+        Half of what chi-square decreases by it [nats].
+    log_prior : float
+        Logarithm of its share among the shapes that were compared.
+    widths : (n,) array
+        Range of each number of the shape, over which it is uniform beforehand.
+    log_share : float
+        Logarithm of the prior probability of what is discrete in it, such as the number of events.
+    log_others : float
+        Logarithm of the mean likelihood of all shapes relative to this one, where Gram space has it: where many do as
+        well, as pulses do whose single steps are not seen, the cause has more than its best shape.
+    """
+
+    effect: Effect
+    gain: float
+    log_prior: float
+    widths: Floats
+    log_share: float
+    log_others: float = -np.inf
+
+    @property
+    def worth(self) -> float:
+        """What it earns beyond its prior [nats]."""
+        return self.gain + self.log_prior
+
+
+class ShapedCause(CauseKind):
+    """Causes that are linear in amplitudes once their shape is chosen."""
+
+    linearised_beside: ClassVar[bool] = True
+
+    def trials(self, effect: Effect, ends: Floats) -> list[tuple[Effect, bool]]:
+        """Return the forms of the bank, and of each whether it stands for one in each recording by itself.
+
+        Parameters
+        ----------
+        effect : Effect
+        ends : (R,) array
+            Lengths of the recordings [s].
+        """
+        raise NotImplementedError
+
+    def proposals(self, point: Linearisation, effect: Effect, causes: Sequence[str]) -> list[ShapeProposal]:
+        """Return the shapes that are worth tuning beside some causes."""
+        raise NotImplementedError
+
+    def shape(self, effect: Effect) -> tuple[Floats, Floats]:
+        """Return the numbers of a shape and the reach of each within which it is first tuned, (n,) both."""
+        raise NotImplementedError
+
+    def with_shape(self, effect: Effect, numbers: Floats) -> Effect | None:
+        """Return an effect with other numbers of its shape, None where they make none."""
+        raise NotImplementedError
+
+    def shape_quantities(self, effect: Effect, names: Sequence[str]) -> list[Quantity]:
+        """Return names and units of the numbers of a shape, given the names of the recordings."""
+        raise NotImplementedError
+
+    def signatures(
+        self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds
+    ) -> SignatureBank:
+        """Return the bank of a few forms of each cause."""
+        ends = np.asarray(fit.operating.sample.environment.time).max(axis=1)
+        signatures: list[Signatures] = []
+        causes = []
+        for effect in effects:
+            forms = []
+            trials = self.trials(effect, ends)
+            responses = _responses(perturbed, fit, [trial for trial, _ in trials])
+            for number, ((trial, apart), columns) in enumerate(zip(trials, responses, strict=True)):
+                parts = list(enumerate(by_recording(fit.posterior, columns))) if apart else [(None, columns)]
+                for recording, part in parts:
+                    where = "" if recording is None else f" in recording {recording + 1}"
+                    parts_of_form, groups = _form(
+                        f"{effect.label} #{number + 1}{where}", trial, part, bounds[effect.label]
+                    )
+                    signatures += [replace(signature, recording=recording) for signature in parts_of_form]
+                    forms.append(groups)
+            causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:])))
+        return SignatureBank(tuple(signatures), tuple(causes))
+
+    def refined(
+        self, point: Linearisation, weighed: SetProbabilities, effects: Sequence[Effect], bounds: Bounds, least: float
+    ) -> Linearisation:
+        """Return the linear model with a tuned form of every cause that is worth it, or the same."""
+        bank, evidence = point.bank, point.evidence
+        mine = {effect.label for effect in effects}
+        companies = [causes for causes in _companies(weighed, mine) if _something_left(evidence, causes)]
+        likeliest = weighed.sets[0].log_prior + weighed.sets[0].log_evidence
+        for effect in effects:
+            tuned: list[tuple[float, tuple[str, ...], ShapeProposal]] = []
+            for causes in companies:
+                log_others = evidence.log_evidence(causes) if causes else 0.0
+                proposals = self.proposals(point, effect, causes)
+                tuned += [(log_others + proposal.worth, causes, proposal) for proposal in proposals]
+            tuned = [trial for trial in tuned if trial[2].worth > WORTH]
+            if not tuned:
+                continue
+            total, causes, proposal = max(tuned, key=lambda trial: trial[0])
+            if total < likeliest - max(WORTH, LOST * proposal.gain):
+                continue
+            tuning = self._tuned(point, proposal, causes, likeliest - total + proposal.gain)
+            if tuning is None:
+                continue
+            exact, log_share = tuning
+            names = [manoeuvre.recording.name for manoeuvre in point.fit.posterior.manoeuvres]
+            label = f"{effect.label} tuned beside {' + '.join(causes) or 'nothing'}"
+            (columns,) = _responses(point.perturbed, point.fit, [exact])
+            items, groups = _form(label, self.with_names(exact, names), columns, bounds[effect.label])
+            cause = next(cause for cause in bank.causes if cause.name == effect.label)
+            weights = [(1.0 - SHARE) * float(np.exp(variant.log_weight)) for variant in cause.variants]
+            more = replace(
+                cause,
+                others=(*(variant.groups for variant in cause.variants[1:]), groups),
+                shares=(*weights, SHARE * float(np.exp(max(log_share, -200.0)))),
+            )
+            others = tuple(more if one is cause else one for one in bank.causes)
+            bank = SignatureBank((*bank.signatures, *items), others)
+        return point if bank is point.bank else point.with_bank(bank)
+
+    def with_names(self, effect: Effect, names: Sequence[str]) -> Effect:
+        """Return an effect whose amplitudes have the names of their recordings."""
+        return effect
+
+    def _tuned(
+        self, point: Linearisation, proposal: ShapeProposal, causes: Sequence[str], enough: float
+    ) -> tuple[Effect, float] | None:
+        """Return the effect whose shape has the least chi-square beside some causes, and the log of its prior's share.
+
+        Of each number the share is what the data leave of its range, ``sqrt(2 pi)`` standard deviations, and shapes
+        elsewhere count as far as they do as well. None where the proposal gains far from enough.
+        """
+        left = Remaining.of(point, causes, point.evidence.forms(causes))
+        best, reach = self.shape(proposal.effect)
+        axes = np.eye(len(best))
+
+        def values(trials: Sequence[Floats]) -> Floats:
+            possible = {k: self.with_shape(proposal.effect, trial) for k, trial in enumerate(trials)}
+            known = {k: effect for k, effect in possible.items() if effect is not None}
+            halves = np.full(len(trials), -np.inf)
+            for k, columns in zip(known, _responses(point.perturbed, point.fit, list(known.values())), strict=True):
+                gram = left.gram(columns, "trial")
+                halves[k] = half_chi2(gram.matrix, gram.score)
+            return halves
+
+        (first,) = values([best])
+        if first < enough - max(WORTH, LOST * first):
+            return None
+        most = first
+        for _ in range(ROUNDS):
+            moves = [step * size * axis for axis, size in zip(axes, reach, strict=True) for step in STEPS]
+            alone = values([best + move for move in moves]).reshape(len(best), -1)
+            gains = alone.max(axis=1) > most
+            chosen = [moves[len(STEPS) * k + int(np.argmax(row))] for k, row in enumerate(alone)]
+            together = best + sum(move for move, gain in zip(chosen, gains, strict=True) if gain)
+            trials = [(most, best), (float(alone.max()), best + moves[int(np.argmax(alone))])]
+            if gains.sum() > 1:
+                trials.append((float(values([together])[0]), together))
+            most, best = max(trials, key=lambda trial: trial[0])
+            reach = reach / NARROWER
+        sizes = reach[:, None] * SIZES
+        trials = [
+            best + sign * size * axis for axis, row in zip(axes, sizes, strict=True) for size in row for sign in (-1, 1)
+        ]
+        drops = most - values(trials).reshape(*sizes.shape, 2).mean(axis=2)
+        log_volume = 0.0
+        for row, drop, width in zip(sizes, drops, proposal.widths, strict=True):
+            place = int(np.argmax(drop > 0.5)) if (drop > 0.5).any() else -1
+            spread = row[place] * np.sqrt(np.pi / drop[place]) if 0.0 < drop[place] < np.inf else 2.0 * row[place]
+            log_volume += float(np.log(min(spread / width, 1.0))) if drop[place] > 0.0 else 0.0
+        effect = self.with_shape(proposal.effect, best)
+        log_share = float(np.logaddexp(proposal.log_share + log_volume, proposal.log_others - (most - first)))
+        return proposal.effect if effect is None else effect, min(log_share, 0.0)
+
+    def with_form(self, effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:
+        """Return the effect in its most probable form."""
+        return point.most_probable_form(effect.label, names).effect or effect
+
+    def starts(self, effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:
+        """Return the mean amplitudes by the linear model."""
+        sigma = [parameter.sigma for parameter in self.with_form(effect, point, names).parameters]
+        return [point.mean_amplitudes(effect.label, names) / np.array(sigma)]
+
+    def quantities(self, effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
+        """Return the amplitudes of each effect in one form of the bank."""
+        return {effect.label: tuple(effect.amplitude_quantities) for effect in effects}
+
+    def instants(self, perturbed: PerturbedModel, fit: Fit, label: str) -> list[CauseAmplitude]:
+        """Return the numbers of the shape of a cause, each with the error that the others leave it, fixed where it is.
+
+        Beside it the amplitudes and all unknowns are fitted anew, to first order about the fit.
+        """
+        mine = (k for k, added in enumerate(fit.effects) if added.cause_kind == self.name and added.candidate == label)
+        if (index := next(mine, None)) is None:
+            return []
+        effect, values = fit.effects[index], fit.values(index)
+        numbers, reach = self.shape(effect)
+        names = [manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres]
+        here = _responses(perturbed, fit, [effect])[0] @ values
+        numbers_of_shape = []
+        for place, quantity in enumerate(self.shape_quantities(effect, names)):
+            wide = reach[place] / NARROWER**ROUNDS
+            for _ in range(ROUNDS + 1):
+                steps = wide * np.arange(-POINTS, POINTS + 1) / POINTS
+                moved = [self.with_shape(effect, numbers + step * (np.arange(len(numbers)) == place)) for step in steps]
+                there = np.array([trial is not None for trial in moved])
+                columns = _responses(perturbed, fit, [trial for trial in moved if trial is not None])
+                changes = np.stack([moved_columns @ values - here for moved_columns in columns], axis=1)
+                steps = steps[there]
+                cost = fit.residual @ changes + 0.5 * np.diag(fit.project(changes))
+                weight = np.exp(cost.min() - cost)
+                weight /= weight.sum()
+                if max(weight[0], weight[-1]) < 1e-3:
+                    break
+                wide *= WIDENED
+            mean = float(weight @ steps)
+            sd = float(np.sqrt(weight @ (steps - mean) ** 2 + (wide / POINTS) ** 2 / 12.0))
+            numbers_of_shape.append(CauseAmplitude(quantity, float(numbers[place]) + mean, sd))
+        return numbers_of_shape
+
+
+def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
+    """Return nothing and the most probable sets of other causes, without anything generic."""
+    companies = dict.fromkeys([()])
+    for cause_set in probabilities.sets:
+        if cause_set.generic is None:
+            companies[tuple(name for name in cause_set.causes if name not in mine)] = None
+        if len(companies) == COMPANIES:
+            break
+    return list(companies)
+
+
+def _something_left(evidence: SetEvidence, causes: Sequence[str]) -> bool:
+    """Return whether any generic candidate gains beside some causes."""
+    gains = evidence.gains_beside(causes, evidence.forms(causes), evidence.generics)
+    return any(log_sum(list(of_forms.values())) > 0.0 for of_forms in gains.values())
+
+
+def _responses(perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
+    """Return the responses to unit amplitudes of some effects, (N, m) each."""
+    widths = [np.array([parameter.sigma for parameter in effect.parameters]) for effect in effects]
+    points = [(effect, np.zeros(len(sigma))) for effect, sigma in zip(effects, widths, strict=True)]
+    columns = perturbed.columns_together(points, fit.operating, fit.z, fit.data) if points else []
+    return [part / sigma for part, sigma in zip(columns, widths, strict=True)]
+
+
+def _form(
+    name: str, effect: Effect, columns: Floats, bounds: Sequence[PhysicalBound]
+) -> tuple[list[Signatures], tuple[AmplitudeGroup, ...]]:
+    """Return the signatures of a form and its groups, one for each unit."""
+    items, groups = [], []
+    units = np.array([parameter.unit for parameter in effect.parameters])
+    for bound in bounds:
+        whole = f"{name} [{bound.unit}]"
+        items.append(Signatures(whole, columns[:, units == bound.unit], effect=effect))
+        groups.append(AmplitudeGroup(whole, bound.largest))
+    return items, tuple(groups)
