@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
+from studies.benchmark.device import LAST, DeviceTimes, device_goals
 from studies.benchmark.report import STUDY, figures_of_merit, goals_of
 from studies.benchmark.run import Benchmark, Result, Rival, Sampling, chain, posterior_of, seconds_per_evaluation
 from studies.common.study import Verdict
@@ -65,4 +66,13 @@ def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
     text = PdfText.read(tmp_path / "benchmark.pdf")
     assert "150 (100 to 200) µs" in text
     assert "varies by a factor of 2, the ratios to the other simulators by 2 and 2" in text
+    assert "400000 on the last one, NVIDIA H100, November 2026" in text
     assert broken_rules(tmp_path / "benchmark.pdf") == []
+
+
+def test_a_device_is_judged_where_there_is_one_and_not_tested_elsewhere():
+    assert [goal.verdict for goal in device_goals(None)] == [Verdict.NOT_TESTED] * 2
+    assert LAST.simulations == pytest.approx(4e5)
+    fast = DeviceTimes("made up", "", {1024: 4e-6}, 3.0)
+    assert [goal.verdict for goal in device_goals(fast)] == [Verdict.PASS, Verdict.FAIL]
+    assert device_goals(fast)[0].reached == "750000"

@@ -49,14 +49,14 @@ LEAST = "jax_persistent_cache_min_compile_time_secs"
 NEVER = 1e9
 """Time of compilation that none reaches [s]."""
 
-QUICKLY = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
+QUICKLY: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
 """Options of XLA: compilation takes two thirds of the time and a fifth less memory, and the code is as fast."""
 
 _known: WeakSet[_KeptJit] = WeakSet()
 
 
 @cache
-def compiler_options() -> dict[str, bool | int]:
+def compiler_options() -> dict[str, Any]:
     """Return those of `QUICKLY` that the installed XLA takes for this device; each version has others."""
 
     def is_taken(name: str) -> bool:

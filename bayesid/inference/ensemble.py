@@ -26,9 +26,9 @@ from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import content_key, refuse_other
 from bayesid._math.arrays import Floats
+from bayesid._math.device import device
 from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import Parameterisation
-from bayesid.inference.posterior import BATCH
 
 __all__ = ["MOST_SECONDS", "Chains", "LaplaceMove", "sample"]
 
@@ -272,7 +272,7 @@ def _tell(progress: Progress, chains: Chains, limit: int, goal: float) -> None:
 
 
 def _walkers(size: int) -> int:
-    pair = 2 * BATCH  # both halves of an ensemble fill whole batches
+    pair = 2 * device().fewest  # both halves of an ensemble fill whole batches
     return pair * max(1, int(np.ceil((2 * size + 2) / pair)))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from scipy.special import ndtri
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.device import device
 from bayesid._math.on_device import on_device
 from bayesid.inference import compiled, whitening
 from bayesid.inference.compiled import Numbers, Structure
@@ -32,13 +32,10 @@ from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
-__all__ = ["BATCH", "Posterior", "whiten"]
+__all__ = ["Posterior", "whiten"]
 
-BATCH = 12
-"""Number of points evaluated together; a batch that fits the processor's cache is three times faster than one of 64."""
-
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-"""Number of batches evaluated at a time."""
+COPIES = 4.0
+"""Number of arrays of the size of the composite body's tables that XLA keeps at a time; on a processor it plans 3.6."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +160,15 @@ class Posterior:
         """Numbers of the model and the prior, which are arguments of the compiled code."""
         return _numbers(self.model, self.unknowns)
 
+    @property
+    def bytes_per_point(self) -> float:
+        """Estimate of the memory that a point takes while its likelihood is computed [bytes].
+
+        Most of it are the tables of the composite body, which depend on the point, at all nodes and samples.
+        """
+        grid = self.data.arrays.grid
+        return COPIES * 8.0 * (grid.node.known.size + grid.sample.known.size)
+
     @cached_property
     def log_normalisation(self) -> Floats:
         """Normalisation constant of the log likelihood of each recording, shape (R,)."""
@@ -239,9 +245,10 @@ class Posterior:
     def log_likelihoods(self, z: Floats) -> Floats:
         """Return the log likelihoods of all recordings at many points, shape (n, size) -> (n, R)."""
         z = np.atleast_2d(z)
-        padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % BATCH, axis=0)])
-        with ThreadPoolExecutor(CORES) as threads:
-            parts = list(threads.map(self._chi2, np.split(padded, len(padded) // BATCH)))
+        batch = device().batch(len(z), self.bytes_per_point)
+        padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % batch, axis=0)])
+        with ThreadPoolExecutor(device().calls) as threads:
+            parts = list(threads.map(self._chi2, np.split(padded, len(padded) // batch)))
         return -0.5 * np.concatenate(parts)[: len(z)] + self.log_normalisation
 
     def _chi2(self, z: Floats) -> Floats:

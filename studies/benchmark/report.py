@@ -13,6 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_text
+from studies.benchmark.device import add_device, device_goals
 from studies.benchmark.run import EVALUATED, RUNS, Benchmark, Result, run
 from studies.common.provenance import processor
 from studies.common.report_parts import columns
@@ -103,7 +104,7 @@ def _report(result: Result) -> Report[Result]:
         answer=f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
         f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and {_spread(figures[1][1])} times "
         "less than MuJoCo's rollouts in C.",
-        goals=goals_of(figures),
+        goals=[*goals_of(figures), *device_goals(result.device)],
         valid=f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
         full=result.full,
@@ -123,7 +124,7 @@ def _report(result: Result) -> Report[Result]:
             replicates=f"{len(runs)} runs of all of it, one after the other; within a run the shortest of several "
             "times counts, after one that is not counted.",
         ),
-        sections=[_simulations, _samples],
+        sections=[_simulations, _samples, _device],
         tables=[CsvTable("runs", ["run", "figure of merit", "value"], rows)],
         beside="",
     )
@@ -191,6 +192,10 @@ def _samples(document: Document, result: Result) -> None:
         "evidence.",
         columns("rlrrrr"),
     )
+
+
+def _device(document: Document, result: Result) -> None:
+    add_device(document, result.device, float(np.median([run.evaluation for run in result.runs])))
 
 
 def _cost(number: int, moves: str, evaluations: int, effective: float, seconds: float) -> list[str]:

@@ -30,6 +30,7 @@ from bayesid.design.design_result import sample_times
 from bayesid.inference import Chains, LogCholeskyParameterisation, identify
 from bayesid.inference.predicted_readings import integration_error_at, simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
+from studies.benchmark.device import DeviceTimes, measured_on_device
 from studies.common.ets7 import INTERVAL, RADIUS, ets7
 from studies.common.study import show
 from studies.truth import stepwise
@@ -284,10 +285,11 @@ class Benchmark:
 
 
 class Result(NamedTuple):
-    """All runs, and whether they took longer chains and more repeats."""
+    """All runs, whether they took longer chains and more repeats, and the times of a device where there is one."""
 
     runs: list[Benchmark]
     full: bool
+    device: DeviceTimes | None = None
 
 
 def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = show) -> Result:
@@ -303,7 +305,7 @@ def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = 
     for number in range(RUNS):
         progress(f"run {number + 1} of {RUNS}")
         results.append(_measured(full=full, seed=seed + number))
-    return Result(results, full)
+    return Result(results, full, measured_on_device(posterior_of(ets7(), recordings=3), seed))
 
 
 def _measured(*, full: bool, seed: int) -> Benchmark:

@@ -1,0 +1,123 @@
+"""Evaluations on a device beside this machine's processor; where there is none, what was measured on the last one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from bayesid import Posterior
+from bayesid._math.device import device
+from bayesid.inference import identify
+from bayesid.report import Document
+from bayesid.report.numbers import format_number
+from studies.common.report_parts import columns
+from studies.common.study import Goal, Verdict
+
+BATCHES = (12, 1024, 8192)  # numbers of points per call
+SIMULATIONS = 500_000.0  # wanted simulations of 120 s per second
+SECONDS = 2.0  # largest wanted time of an identification of the base to `SAMPLES` effective samples, compiled [s]
+SAMPLES = 4000.0  # its effective samples
+REPEATS = 5  # times that a call is measured, the shortest counts
+
+
+class DeviceTimes(NamedTuple):
+    """What one device takes for the posterior of three recordings of 120 s."""
+
+    name: str  # of the device
+    date: str  # when it was measured, empty for now
+    per_point: dict[int, float]  # time of a point by the number of points per call [s]
+    identification: float | None  # time of an identification to `SAMPLES` effective samples, None if not measured [s]
+
+    @property
+    def simulations(self) -> float:
+        """Largest number of simulations per second; a point has three of them."""
+        return 3.0 / min(self.per_point.values())
+
+
+LAST = DeviceTimes("NVIDIA H100", "November 2026", {12: 955e-6, 1024: 18e-6, 8192: 7.5e-6}, None)
+"""Figures of the last device that was there; 65,536 points in one call ran out of its 80 GB."""
+
+
+def measured_on_device(posterior: Posterior, seed: int = 0) -> DeviceTimes | None:
+    """Measure the device beside the processor, None where there is none.
+
+    Parameters
+    ----------
+    posterior : Posterior; of three recordings
+    seed : int; seed of the points and of the sampler
+    """
+    if device().platform == "cpu":
+        return None
+    rng, per_point = np.random.default_rng(seed), {}
+    for batch in BATCHES:
+        z = posterior.starting_point() + 0.01 * rng.normal(size=(batch, posterior.size))
+        per_point[batch] = _shortest(lambda z=z: posterior.log_density(z)) / batch
+    identify(posterior, seed, effective_samples=SAMPLES)
+    seconds = _shortest(lambda: identify(posterior, seed + 1, effective_samples=SAMPLES), 1)
+    return DeviceTimes(jax.devices()[0].device_kind, "", per_point, seconds)
+
+
+def _shortest(function: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Return the shortest time of a call, after one that is not counted [s]."""
+    times = []
+    for _ in range(repeats + 1):
+        begin = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - begin)
+    return min(times[1:])
+
+
+def device_goals(measured: DeviceTimes | None) -> list[Goal]:
+    """Return the goals of a device, not tested where there is none."""
+    last = measured or LAST
+    when = "" if measured else f" on the last one, {last.name}, {last.date}"
+    taken = "not measured" if last.identification is None else f"{last.identification:.2g} s"
+    fast = measured and measured.simulations >= SIMULATIONS
+    soon = measured and measured.identification is not None and measured.identification <= SECONDS
+    return [
+        Goal(
+            f"simulations of 120 s per second on a device: at least {SIMULATIONS:.0f}",
+            f"{format_number(last.simulations, 3)}{when}",
+            Verdict.of(fast),
+        ),
+        Goal(
+            f"time of an identification to {SAMPLES:.0f} effective samples on a device, compiled: "
+            f"at most {SECONDS:g} s",
+            f"{taken}{when}",
+            Verdict.of(soon),
+        ),
+    ]
+
+
+def add_device(document: Document, measured: DeviceTimes | None, evaluation: float) -> None:
+    """Add the section on devices.
+
+    Parameters
+    ----------
+    document : Document
+    measured : DeviceTimes or None
+    evaluation : float; time of a simulation of one recording on this machine's processor [s]
+    """
+    last = measured or LAST
+    document.section("On another device")
+    if measured is None:
+        document.paragraph(
+            f"This machine has none, so that nothing was tested here; the figures are those of an {last.name}, "
+            f"{last.date}. There, 65536 points in one call ran out of 80 GB. Calls are now as large as the memory of "
+            "the device allows: most of a point's are the tables of the composite body at all nodes and samples."
+        )
+    rows = [
+        [str(batch), format_number(1e6 * seconds, 3), format_number(3.0 / seconds, 3)]
+        for batch, seconds in last.per_point.items()
+    ]
+    rows.append(["this machine's processor", format_number(3e6 * evaluation, 3), format_number(1.0 / evaluation, 3)])
+    document.table(
+        ["points per call", "time of a point [µs]", "simulations per second"],
+        rows,
+        f"Points of three recordings of 120 s on {last.name}, and three of one recording on this machine.",
+        columns("lrr"),
+    )
