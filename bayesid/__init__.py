@@ -15,7 +15,6 @@ from __future__ import annotations
 import ast
 import importlib
 import sys
-import warnings
 from pathlib import Path
 from types import ModuleType
 
@@ -30,9 +29,6 @@ _PLACES = {
 }
 
 __all__ = sorted(_PLACES)
-
-# the pinned ArviZ announces its successor at every import
-warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=FutureWarning)
 
 
 class _Package(ModuleType):

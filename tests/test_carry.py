@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import arviz as az
+import arviz_base as az
 import numpy as np
 import pytest
 from conftest import PLANAR
@@ -167,11 +167,20 @@ def study_of(folder: Path, names: tuple[str, ...], **unknowns: object) -> Study:
     draws = [[draw_inertial(links[name].inertial, 0.05, rng).vector for name in names] for _ in range(100)]
     values = np.reshape(draws, (2, 50, len(names), 10))
     data = az.from_dict(
-        posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": list(names)}
+        {"posterior": {"inertial": values}}, dims={"inertial": ["body", "parameter"]}, coords={"body": list(names)}
     )
     data.to_netcdf(str(folder / "posterior.nc"))
     section = {"bodies": ["base_link"], "posterior": str(folder / "posterior.nc"), **unknowns}
     return Study.from_mapping({**STUDY, "unknowns": section})
+
+
+def test_a_file_that_the_legacy_arviz_wrote_is_read():
+    draws = InertialDraws.read(Path(__file__).parent / "legacy_posterior.nc")
+    assert draws.names == ("base_link", "load")
+    assert draws.values.shape == (6, 2, 10)
+    assert draws.values.sum() == pytest.approx(180.655)
+    last = [1.909, 1.393, 1.349, 1.348, 1.481, 1.093, 1.547, 1.921, 1.563, 1.744]
+    np.testing.assert_array_equal(draws.values[5, 1], last)
 
 
 def test_a_study_starts_from_an_earlier_posterior(tmp_path):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bayesid.inference.importance import GOOD, TRIAL, choose_parameterisation, weighted_draws
+from bayesid.inference.importance import GOOD, TRIAL, _weighted, choose_parameterisation, weighted_draws
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation
 from bayesid.inference.posterior import Posterior
@@ -58,3 +59,21 @@ def test_the_better_of_two_where_it_is_not(planar_posterior: Callable[..., Poste
     chosen = choose_parameterisation(posterior, optimum, np.random.default_rng(2))
     assert isinstance(chosen, LogCholeskyParameterisation if shares[0] > shares[1] else LinearParameterisation)
     assert evaluated == [TRIAL, TRIAL]
+
+
+@pytest.mark.parametrize("tail", [0.2, 0.9])
+def test_k_hat_is_the_tail_of_the_weights(tail: float):
+    """The weights are powers of a uniform number, which are Pareto's with that shape; light ones are as they are."""
+    logarithms = tail * np.random.default_rng(2).exponential(size=(40, 4000))
+    unchanged = SimpleNamespace(to_z=lambda y: y)
+    drawn = [_weighted(unchanged, np.zeros((4000, 1)), row) for row in logarithms]
+    assert np.mean([one.pareto_k for one in drawn]) == pytest.approx(tail, abs=0.05)
+    body = logarithms[0] < np.quantile(logarithms[0], 0.9)
+    ratio = drawn[0].weights[body] / np.exp(logarithms[0][body])
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-9)
+
+
+def test_weights_without_a_tail_are_not_trusted():
+    few = np.full(1000, -800.0)
+    few[:3] = 0.0
+    assert _weighted(SimpleNamespace(to_z=lambda y: y), np.zeros((1000, 1)), few).pareto_k == np.inf

@@ -10,13 +10,15 @@ import sys
 import pytest
 
 HEAD = """
-import json, sys, threading
+import json, sys, threading, warnings
 import jax, jax.numpy as jnp
 import numpy as np
 
 floats = jax.jit(lambda x: 2.0 * x)
 before = [str(jnp.ones(3).dtype), str(floats(np.ones(3)).dtype)]
+filters = list(warnings.filters)
 import bayesid
+assert warnings.filters == filters
 shipped = f"{bayesid.__path__[0]}/app/demonstration_data/study.toml"
 posterior = bayesid.load_posterior(bayesid.Study.load(shipped))
 z = posterior.starting_point() + 1e-3 * np.random.default_rng(0).normal(size=(3, posterior.size))

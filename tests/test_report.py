@@ -5,10 +5,10 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import arviz as az
 import numpy as np
 import pytest
 import typst
+from arviz_stats.base import array_stats
 from matplotlib.figure import Figure
 
 from bayesid._io.errors import InputError
@@ -436,7 +436,7 @@ def test_running_means_end_at_the_mean_of_each_ensemble(result):
     for left, right in panels:
         name, _, r_hat = left.get_title().partition(", R-hat ")
         column = draws[:, :, names.index(name)]
-        assert r_hat == f"{float(az.rhat(column)):.4f}"
+        assert r_hat == f"{float(array_stats.rhat(column)):.4f}"
         steps = draws.shape[1] // result.chains.walkers * result.chains.walkers
         for number, line in enumerate(left.lines):
             assert line.get_label() == f"ensemble {number + 1}"

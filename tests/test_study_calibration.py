@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arviz.stats.ecdf_utils import ecdf_confidence_band
 from scipy import stats
 
 from studies.calibration import STUDY, make, plan, read
@@ -19,6 +18,7 @@ from studies.calibration.replicate import (
     coverage,
     holm,
     interval_coverage,
+    uniform_band,
     uniform_p_value,
 )
 from studies.calibration.report import goals_of
@@ -38,8 +38,16 @@ def ranks_with(counts):
     return np.repeat(middles, inside)
 
 
-def test_the_test_of_uniformity_is_the_band_of_arviz():
-    low, high = (120 * side for side in ecdf_confidence_band(120, POINTS, POINTS, prob=0.95))
+def test_the_band_holds_uniform_ranks_as_often_as_it_says():
+    low, high = uniform_band(120, 0.95)
+    ranks = np.random.default_rng(5).uniform(size=(4000, 120))
+    shares = (ranks[:, :, None] < POINTS).mean(axis=1)
+    inside = int(((shares >= low) & (shares <= high)).all(axis=1).sum())
+    assert stats.binomtest(inside, len(shares), 0.95).pvalue > 0.01
+
+
+def test_the_test_of_uniformity_is_that_of_the_band():
+    low, high = (120 * side for side in uniform_band(120, 0.95))
     for edge in (low, high):
         counts = np.maximum.accumulate(np.round(edge).astype(int))
         sign = 1 if edge is high else -1

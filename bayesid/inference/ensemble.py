@@ -348,7 +348,7 @@ def _likelihoods(sampler: emcee.EnsembleSampler) -> Floats:
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], goal: float) -> Chains:
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    from arviz_stats.base import array_stats  # here, as it takes a second that commands without samples save
 
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
@@ -358,7 +358,7 @@ def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSa
     y = np.stack([chain[burn:].reshape(-1, chain.shape[-1]) for chain in chains])
     walkers = chains[0].shape[1]
     effective = y.shape[0] * y.shape[1] / tau
-    r_hat = float(np.max([az.rhat(y[:, :, k]) for k in range(y.shape[2])]))
+    r_hat = float(np.max(array_stats.rhat(y, chain_axis=0, draw_axis=1)))
     return Chains(
         parameterisation=parameterisation,
         y=y,

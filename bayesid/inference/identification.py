@@ -222,10 +222,10 @@ class Identification(ShortForm):
     @cached_property
     def r_hat(self) -> dict[str, float]:
         """R-hat of every unknown over the ensembles."""
-        import arviz as az  # here, as it takes a second that commands without samples save
+        from arviz_stats.base import array_stats  # here, as it takes a second that commands without samples save
 
-        draws = self.chains.z
-        return {name: float(az.rhat(draws[:, :, k])) for k, name in enumerate(self.posterior.unknowns.names)}
+        values = array_stats.rhat(self.chains.z, chain_axis=0, draw_axis=1)
+        return dict(zip(self.posterior.unknowns.names, values.tolist(), strict=True))
 
     @property
     def expected_chi2(self) -> tuple[float, float]:
@@ -360,7 +360,7 @@ class Identification(ShortForm):
         seed : int
             Seed of the predicted sensor noise and of the draws from the prior.
         """
-        return to_arviz(self, np.random.default_rng(seed)).to_datatree()
+        return to_arviz(self, np.random.default_rng(seed))
 
     @cached_property
     def robot(self) -> Robot:

@@ -176,7 +176,7 @@ def _enough(parameterisation: Parameterisation, optimum: Optimum, rng: np.random
 
 def _weighted(parameterisation: Parameterisation, y: Floats, log_weights: Floats) -> WeightedDraws:
     """Return draws with Pareto-smoothed weights."""
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    from arviz_stats.base import array_stats  # here, as it takes a second that commands without samples save
 
     z, draws = np.nan_to_num(parameterisation.to_z(y)), len(y)
     top = float(log_weights.max())
@@ -184,9 +184,10 @@ def _weighted(parameterisation: Parameterisation, y: Floats, log_weights: Floats
         return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
     inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
-    with np.errstate(over="ignore"):  # overflow means hardly any overlap, which k-hat shows
-        smoothed, pareto_k = az.psislw(log_weights)
-    weights = np.exp(np.asarray(smoothed))
+    weights, pareto_k = np.exp(log_weights - top), np.inf
+    if np.count_nonzero(log_weights > top - 700.0) > 3.0 * np.sqrt(draws):  # they fill the tail that is fitted
+        smoothed, pareto_k = array_stats.psislw(-log_weights)  # which takes log likelihoods and inverts them
+        weights = np.exp(smoothed)
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 
 

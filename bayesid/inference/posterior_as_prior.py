@@ -73,14 +73,14 @@ class InertialDraws:
         InputError
             If the file is absent or holds no such draws.
         """
-        import arviz as az  # imported here, since it takes a second that commands without samples save
+        from xarray import open_datatree  # imported here, since it takes a second that commands without samples save
 
         remedy = "Name the posterior.nc that bayesid identify wrote"
         if not file.is_file():
             raise InputError("there is no such file", file=file, remedy=remedy)
         try:
-            data = az.from_netcdf(str(file))
-            inertial = data.posterior["inertial"]
+            data = open_datatree(file)
+            inertial = data["posterior"]["inertial"]
             names = tuple(str(name) for name in inertial.coords["body"].values)
             values = np.array(inertial.transpose("chain", "draw", "body", "parameter").values, dtype=float)
             data.close()

@@ -18,7 +18,7 @@ from bayesid.inference.predicted_readings import noisy, predicted_readings
 from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
-    import arviz as az
+    from xarray import DataTree
 
 __all__ = ["SampledResult", "to_arviz", "write_draws", "write_netcdf"]
 
@@ -55,7 +55,7 @@ class SampledResult(Protocol):
         ...
 
 
-def to_arviz(result: SampledResult, rng: np.random.Generator) -> az.InferenceData:
+def to_arviz(result: SampledResult, rng: np.random.Generator) -> DataTree:
     """Return a result as ArviZ data, in which each independent ensemble is a chain.
 
     The group ``posterior`` holds the physical quantities, ``inertial`` with the linear parameters of all bodies,
@@ -69,7 +69,7 @@ def to_arviz(result: SampledResult, rng: np.random.Generator) -> az.InferenceDat
     rng : numpy.random.Generator
         Of the sensor noise.
     """
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    import arviz_base as az  # imported here, since it takes a second that commands without samples save
 
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
@@ -77,26 +77,30 @@ def to_arviz(result: SampledResult, rng: np.random.Generator) -> az.InferenceDat
     predictive = _predictive(result, few, rng)
     prior, _, _ = _posterior_group(result, rng.normal(size=(1, STORED, result.posterior.size)))
     data = az.from_dict(
-        posterior=posterior,
-        prior=prior,
-        sample_stats={"lp": result.posterior.log_prior(z) + _thin(result.chains.log_likelihood, STORED).sum(axis=2)},
-        log_likelihood=_log_likelihood(result),
-        posterior_predictive=predictive,
-        observed_data=_observed(result),
+        {
+            "posterior": posterior,
+            "prior": prior,
+            "sample_stats": {
+                "lp": result.posterior.log_prior(z) + _thin(result.chains.log_likelihood, STORED).sum(axis=2)
+            },
+            "log_likelihood": _log_likelihood(result),
+            "posterior_predictive": predictive,
+            "observed_data": _observed(result),
+        },
         dims={**dims, **_sensor_dims(result)},
         coords=_coords(result),
     )
     for name, described in attributes.items():
-        data.posterior[name].attrs.update(described)
-        data.prior[name].attrs.update(described)
-    for group in (data.posterior_predictive, data.observed_data):
+        data["posterior"][name].attrs.update(described)
+        data["prior"][name].attrs.update(described)
+    for group in (data["posterior_predictive"], data["observed_data"]):
         for sensor in result.posterior.model.sensors:
             for manoeuvre in result.posterior.manoeuvres:
                 variable = group[_name(sensor.kind, manoeuvre.recording.name)]
                 variable.attrs.update(unit=sensor.kind.unit, frame=sensor.kind.frame)
         for manoeuvre in result.posterior.manoeuvres if result.posterior.model.torque is not None else ():
             group[f"torque.{manoeuvre.recording.name}"].attrs.update(unit="N m or N", frame="along the joint's axis")
-    data.posterior.attrs.update(
+    data["posterior"].attrs.update(
         unknowns=list(result.posterior.unknowns.names),
         log_evidence=result.evidence.value,
         log_evidence_error=result.evidence.error,
@@ -132,10 +136,10 @@ def write_draws(names: Sequence[str], values: Floats, file: Path) -> None:
         Linear parameters, SI.
     file : Path
     """
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    import arviz_base as az  # imported here, since it takes a second that commands without samples save
 
     dims, coords = {"inertial": ["body", "parameter"]}, {"body": list(names), "parameter": list(LINEAR)}
-    data = az.from_dict(posterior={"inertial": values}, dims=dims, coords=coords)
+    data = az.from_dict({"posterior": {"inertial": values}}, dims=dims, coords=coords)
     with complete_file(file) as part:
         data.to_netcdf(str(part))
 

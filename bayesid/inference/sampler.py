@@ -154,7 +154,7 @@ def chains_of(posterior: Posterior, drawn: PosteriorDraws, rng: np.random.Genera
     InputError
         If the draws have another shape, or none of them a weight or a finite density.
     """
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    from arviz_stats.base import array_stats  # here, as it takes a second that commands without samples save
 
     z, effective = np.asarray(drawn.z, dtype=float), drawn.effective_samples
     if z.ndim not in (2, 3) or z.shape[-1] != posterior.size or z.shape[-2] < 2 * ENSEMBLES:
@@ -174,9 +174,9 @@ def chains_of(posterior: Posterior, drawn: PosteriorDraws, rng: np.random.Genera
     densities = posterior.log_densities(z.reshape(-1, posterior.size)).reshape(*z.shape[:2], -1)
     if not np.isfinite(densities[:, :, 0]).all():
         raise InputError("the sampler returned draws of no finite density", remedy="Return draws of the posterior")
-    of_each = [z[:, :, k] for k in range(posterior.size)]
-    effective = min(float(az.ess(one, method="bulk")) for one in of_each) if effective is None else effective
-    r_hat = max(float(az.rhat(one)) for one in of_each)
+    axes = {"chain_axis": 0, "draw_axis": 1}
+    effective = float(array_stats.ess(z, method="bulk", **axes).min()) if effective is None else effective
+    r_hat = float(array_stats.rhat(z, **axes).max())
     return Chains(
         parameterisation=LogCholeskyParameterisation(posterior),
         y=z,

@@ -19,7 +19,7 @@ import numpy as np
 from scipy import stats
 
 from bayesid import Manoeuvre, Posterior
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of
 from bayesid.inference.ensemble import sample
 from bayesid.inference.importance import choose_parameterisation, weighted_draws
@@ -207,14 +207,41 @@ def uniform_p_value(ranks: Floats) -> float:
     total = len(ranks)
     observed = np.searchsorted(np.sort(ranks), POINTS, side="right")
     least = min(np.minimum(stats.binom.cdf(observed, total, POINTS), stats.binom.sf(observed - 1, total, POINTS)))
+    return 1.0 - _probability_inside(total, _counts_inside(total, least))
+
+
+def uniform_band(total: int, probability: float) -> tuple[Floats, Floats]:
+    """Return the ends at `POINTS` of the band that holds the distribution function of uniform ranks.
+
+    Parameters
+    ----------
+    total : int; number of ranks
+    probability : float; probability that the whole function is within the band, which has at least that
+    """
+    wide, narrow = -745.0, np.log(0.5)  # logarithms of the binomial tail that counts of the band exceed
+    while narrow - wide > 1e-6:
+        middle = 0.5 * (wide + narrow)
+        enough = _probability_inside(total, _counts_inside(total, np.exp(middle))) >= probability
+        wide, narrow = (middle, narrow) if enough else (wide, middle)
+    inside = _counts_inside(total, np.exp(wide))
+    low, high = (np.array([side(counts) for counts in inside]) / total for side in (np.min, np.max))
+    return low, high
+
+
+def _counts_inside(total: int, least: float) -> list[Integers]:
+    """Return the counts below each of `POINTS` whose binomial tails exceed a probability."""
     every = np.arange(total + 1)
+    tails = [np.minimum(stats.binom.cdf(every, total, p), stats.binom.sf(every - 1, total, p)) for p in POINTS]
+    return [every[tail > least * (1.0 + 1e-9)] for tail in tails]
+
+
+def _probability_inside(total: int, counts: Sequence[Integers]) -> float:
+    """Return the probability that so many uniform ranks have one of these counts below each of `POINTS`."""
     before, probability, last = np.zeros(1, dtype=int), np.ones(1), 0.0
-    for here in POINTS:
-        tails = np.minimum(stats.binom.cdf(every, total, here), stats.binom.sf(every - 1, total, here))
-        inside = every[tails > least * (1.0 + 1e-9)]
+    for inside, here in zip(counts, POINTS, strict=True):
         step = stats.binom.pmf(inside - before[:, None], total - before[:, None], (here - last) / (1.0 - last))
         before, probability, last = inside, probability @ step, here
-    return float(np.clip(1.0 - probability.sum(), 0.0, 1.0))
+    return float(np.clip(probability.sum(), 0.0, 1.0))
 
 
 def holm(p_values: Mapping[K, float]) -> dict[K, float]:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from arviz.stats.ecdf_utils import ecdf_confidence_band
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
@@ -27,7 +26,17 @@ from studies.calibration.data import (
     smooth_share,
     smoothed_errors,
 )
-from studies.calibration.replicate import ALL, ARMS, LEVELS, LOG_LIKELIHOOD, POINTS, Method, Replicates, pooled_coverage
+from studies.calibration.replicate import (
+    ALL,
+    ARMS,
+    LEVELS,
+    LOG_LIKELIHOOD,
+    POINTS,
+    Method,
+    Replicates,
+    pooled_coverage,
+    uniform_band,
+)
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.monte_carlo import Workers, run_trials
@@ -168,7 +177,7 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
         "mode, and ranks the truth among draws of the posterior. Around one data set, truths are drawn from its "
         "posterior and each replicate's posterior is that of both data sets. Data of cases named MuJoCo share no code "
         f"with the package. Median processor time of a replicate {seconds:.1f} s. Method: Talts et al. 2018; "
-        "Säilynoja, Bürkner and Vehtari 2022 (bands, by ArviZ); Modrák et al. 2023.",
+        "Säilynoja, Bürkner and Vehtari 2022 (bands); Modrák et al. 2023.",
     )
 
 
@@ -327,7 +336,7 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
     panels = figure.subplots(rows, 3, squeeze=False, sharex=True)
     for axes, runs in zip(panels.ravel(), shown, strict=False):
         count = len(runs.results)
-        low, high = ecdf_confidence_band(count, POINTS, POINTS, prob=1.0 - FAMILYWISE / family)
+        low, high = uniform_band(count, 1.0 - FAMILYWISE / family)
         axes.fill_between(POINTS, low - POINTS, high - POINTS, color=COLOURS[0], alpha=0.15, linewidth=0.0)
         for name, ranks in runs.ranks().items():
             share = np.searchsorted(np.sort(ranks), POINTS, side="right") / count
