@@ -7,8 +7,10 @@ import json
 import re
 import subprocess
 import sys
+import tempfile
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from xarray import open_datatree
 
 import bayesid
 from bayesid import app as app_room
+from bayesid._io.files import write_json
 from bayesid.app.command_line import app
 from bayesid.report.numbers import format_fixed, format_number, format_quantity
 from studies.truth.bodies import SERVICER4
@@ -41,6 +44,13 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(*arguments: object) -> tuple[int, str]:
     result = CliRunner().invoke(app, [str(argument) for argument in arguments])
     return result.exit_code, re.sub(r"\s+", " ", result.output)
+
+
+def as_json(result: Any) -> dict:
+    """Content of a result's JSON file."""
+    with tempfile.TemporaryDirectory() as folder:
+        write_json(Path(folder) / "result.json", result.to_dict())
+        return json.loads((Path(folder) / "result.json").read_text(encoding="utf-8"))
 
 
 def copy(study: Path, folder: Path) -> Path:
@@ -110,6 +120,9 @@ def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     assert {"rate", "accel", "position.joint1"} <= {channel["name"] for channel in checked["channels"]}
     status, output = run("simulate", study, "--output", tmp_path / "simulate", "--seed", 5)
     assert status == 0, output
+    for name, result in (("check", bayesid.check(study)), ("simulate", bayesid.simulate(study, seed=5))):
+        file = "simulation" if name == "simulate" else name
+        assert json.loads((tmp_path / name / f"{file}.json").read_text()) == as_json(result)
     report = PdfText.read(tmp_path / "check" / "report.pdf")
     assert "command: bayesid check study.toml" in report
     assert "Check of the study and its recordings" in report

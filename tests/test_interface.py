@@ -8,10 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import PLANAR
-from test_cli import run
+from test_cli import as_json, run
 from test_identifiability_command import study
 
 import bayesid
@@ -53,6 +52,7 @@ def test_a_function_with_the_name_of_a_room_stays_one(name):
     assert inspect.ismodule(room)
 
 
+@pytest.mark.slow
 def test_the_order_of_imports_does_not_matter():
     code = "import bayesid.design.criteria, bayesid.identifiability; from bayesid import design, identifiability; "
     code += "import bayesid; assert bayesid.design is design and callable(design) and callable(identifiability); "
@@ -67,23 +67,13 @@ def written(file: Path) -> dict:
     return json.loads(file.read_text(encoding="utf-8"))
 
 
-def as_json(result: object) -> dict:
-    def plain(value: object) -> object:
-        return value.tolist() if isinstance(value, np.ndarray | np.generic) else list(value)
-
-    return json.loads(json.dumps(result.to_dict(), default=plain))
-
-
+@pytest.mark.slow  # of check and simulate, tests of the command line show the same
 @pytest.mark.parametrize(
     ("name", "file", "options"),
     [
-        ("check", "check.json", {}),
-        ("simulate", "simulation.json", {"seed": 4}),
-        pytest.param(*("predict", "prediction.json", {"seed": 4, "draws": 20}), marks=pytest.mark.slow),
-        pytest.param(
-            *("identify", "identification.json", {"seed": 4, "effective_samples": 100.0}), marks=pytest.mark.slow
-        ),
-        pytest.param(*("identifiability", "identifiability.json", {"seed": 4, "profiles": 0}), marks=pytest.mark.slow),
+        ("predict", "prediction.json", {"seed": 4, "draws": 20}),
+        ("identify", "identification.json", {"seed": 4, "effective_samples": 100.0}),
+        ("identifiability", "identifiability.json", {"seed": 4, "profiles": 0}),
     ],
 )
 def test_a_command_writes_what_its_function_returns(name, file, options, study, tmp_path):

@@ -56,25 +56,34 @@ class Nuts:
         return bayesid.PosteriorDraws(target.optimum.z + x @ np.asarray(factor).T)
 
 
-def likelihood_within(posterior, z):
-    """Log likelihood, low and finite where the simulation has no finite readings."""
-    return np.nan_to_num(posterior.log_likelihood(z), neginf=-1e300)
+BROAD = 3.0
+"""Width of the prior that nested sampling starts from, in those of the Laplace approximation, as it would take minutes
+from the posterior's own."""
+
+
+class Broad:
+    """A posterior as nested samplers want it: a transform of the unit cube, and what is left of the log density."""
+
+    def __init__(self, target) -> None:
+        self.posterior, self.centre = target.posterior, target.optimum.z
+        self.factor = BROAD * np.linalg.cholesky(target.optimum.covariance)
+        self.prior = stats.multivariate_normal(self.centre, self.factor @ self.factor.T)
+
+    def transform(self, unit):
+        return self.centre + self.posterior.prior_transform(unit) @ self.factor.T
+
+    def log_likelihood(self, z):
+        return np.maximum(self.posterior.log_density(z) - self.prior.logpdf(z), -1e300)
 
 
 class Dynesty:
-    """Nested sampling of the prior by dynesty, one point at a time."""
+    """Nested sampling by dynesty, one point at a time."""
 
     def sample(self, target, rng, *, effective_samples, progress):
         from dynesty import NestedSampler
 
-        posterior = target.posterior
-        sampler = NestedSampler(
-            lambda z: float(likelihood_within(posterior, z)),
-            posterior.prior_transform,
-            posterior.size,
-            nlive=100,
-            rstate=rng,
-        )
+        broad, n = Broad(target), target.posterior.size
+        sampler = NestedSampler(broad.log_likelihood, broad.transform, n, nlive=100, rstate=rng)
         sampler.run_nested(print_progress=False, dlogz=0.5)
         results = sampler.results
         self.log_evidence, self.error = float(results.logz[-1]), float(results.logzerr[-1])
@@ -83,21 +92,20 @@ class Dynesty:
 
 
 class Nautilus:
-    """Nested sampling of the prior by nautilus, in batches."""
+    """Nested sampling by nautilus, in batches."""
 
     def sample(self, target, rng, *, effective_samples, progress):
         from nautilus import Sampler
 
-        posterior = target.posterior
-        sampler = Sampler(
-            posterior.prior_transform,
-            lambda z: likelihood_within(posterior, z),
-            n_dim=posterior.size,
-            n_live=500,
-            vectorized=True,
-            pass_dict=False,
-            seed=int(rng.integers(2**31)),
-        )
+        broad, seed = Broad(target), int(rng.integers(2**31))
+        options = {
+            "n_dim": target.posterior.size,
+            "n_live": 300,
+            "n_networks": 1,
+            "vectorized": True,
+            "pass_dict": False,
+        }
+        sampler = Sampler(broad.transform, broad.log_likelihood, seed=seed, **options)
         sampler.run(n_eff=effective_samples)
         self.log_evidence, self.error = float(sampler.log_z), 0.05
         z, log_weights, _ = sampler.posterior()
