@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bayesid.diagnosis.candidates.cause_kind import candidates
     from bayesid.diagnosis.diagnose import diagnose, identify_extended
     from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities
-    from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Status
+    from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Remainder, Rest, Status
     from bayesid.diagnosis.loop_review import DiagnosisReview
     from bayesid.diagnosis.outcome.candidate_table import Candidate
     from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, Frame

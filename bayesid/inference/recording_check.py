@@ -243,8 +243,8 @@ def _spectra(posterior: Posterior, index: int) -> tuple[ChannelSpectrum, ...]:
     for kind in posterior.model.channels.kinds:
         if kind.is_difference:
             (time, values), blocks = data.samples_of(index, kind), len(data.measured(index, kind)[0])
-            sigma = data.sigma_per_sample(index, kind)
-            for name, column, level in zip(kind.components, values.T, sigma, strict=True):
+            levels = data.sigma_per_sample(index, kind)
+            for name, column, level in zip(kind.components, values.T, levels, strict=True):
                 gone, _ = spikes(column, float(level))
                 gone = gone if blocks < len(time) else np.zeros_like(gone)
                 spectrum = channel_spectrum(name, time[~gone], column[~gone], blocks, float(level), int(gone.sum()))

@@ -128,13 +128,15 @@ def channel_spectrum(
     count, interval = len(time), float(np.median(np.diff(time)))
     block_rate = 1.0 / (interval * max(1, round(count / blocks)))
     length = max(8, min(LONGEST_PIECE, 2 * count // PIECES))
-    frequency, power = signal.welch(values, 1.0 / interval, nperseg=min(length, count), detrend="linear")
+    frequency, power = signal.welch(
+        np.asarray(values, dtype=np.float64), 1.0 / interval, nperseg=min(length, count), detrend="linear"
+    )
     pieces = max(1.0, INDEPENDENT * (2 * count // len(values[:length]) - 1))
     inside = slice(1, len(frequency) - 1)
     frequency, power = frequency[inside], power[inside]
     above = frequency > block_rate
     sigma = error = np.nan
-    slope, tones = 0.0, ()
+    slope, tones = 0.0, tuple[Tone, ...]()
     if blocks < count and above.sum() >= NEAR:
         high, line = frequency[above], power[above]
         noise = median_filter(line, NEAR, mode="nearest") / (1.0 - 1.0 / (9.0 * pieces)) ** 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -55,7 +56,7 @@ def measured_on_device(posterior: Posterior, seed: int = 0) -> DeviceTimes | Non
     rng, per_point = np.random.default_rng(seed), {}
     for batch in BATCHES:
         z = posterior.starting_point() + 0.01 * rng.normal(size=(batch, posterior.size))
-        per_point[batch] = _shortest(lambda z=z: posterior.log_density(z)) / batch
+        per_point[batch] = _shortest(partial(posterior.log_density, z)) / batch
     identify(posterior, seed, effective_samples=SAMPLES)
     seconds = _shortest(lambda: identify(posterior, seed + 1, effective_samples=SAMPLES), 1)
     return DeviceTimes(jax.devices()[0].device_kind, "", per_point, seconds)

@@ -119,7 +119,7 @@ def _best_phases(courses: CourseGram, period: float, duty: float, alternating: b
         times = courses.times(recording)
         since = times - phases[:, None]
         number = np.floor(since / period)
-        on = (since - number * period < duty * period) & (since >= 0.0)
+        on = ((since - number * period < duty * period) & (since >= 0.0)).astype(float)
         signs = np.where(alternating & (np.mod(number, 2.0) > 0.5), -1.0, 1.0)
         cosines = courses.cosines(recording, on * signs)
         matrices.append(courses.information(recording, cosines, cosines))

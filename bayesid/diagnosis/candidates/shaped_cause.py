@@ -220,10 +220,10 @@ class ShapedCause(CauseKind):
             most, best = max(trials, key=lambda trial: trial[0])
             reach = reach / NARROWER
         sizes = reach[:, None] * SIZES
-        trials = [
+        sided: list[Floats] = [
             best + sign * size * axis for axis, row in zip(axes, sizes, strict=True) for size in row for sign in (-1, 1)
         ]
-        drops = most - values(trials).reshape(*sizes.shape, 2).mean(axis=2)
+        drops = most - values(sided).reshape(*sizes.shape, 2).mean(axis=2)
         log_volume = 0.0
         for row, drop, width in zip(sizes, drops, proposal.widths, strict=True):
             place = int(np.argmax(drop > 0.5)) if (drop > 0.5).any() else -1
@@ -282,7 +282,7 @@ class ShapedCause(CauseKind):
 
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
     """Return nothing and the most probable sets of other causes, without anything generic."""
-    companies = dict.fromkeys([()])
+    companies: dict[tuple[str, ...], None] = {(): None}
     for cause_set in probabilities.sets:
         if cause_set.generic is None:
             companies[tuple(name for name in cause_set.causes if name not in mine)] = None

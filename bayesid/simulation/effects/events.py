@@ -48,7 +48,7 @@ class Events(Effect):
 
     cause_kind = "event"
     constant_names = ("recordings", "times", "shapes", "shares")
-    amplitude: ClassVar[Sequence[tuple[str, str, float]]] = ()
+    amplitude: Sequence[tuple[str, str, float]] = ()
     """Name, unit and prior standard deviation of each amplitude of one event."""
     trial_shapes: ClassVar[Sequence[tuple[float, ...]]] = ((),)
     """Shapes that a diagnosis tries, equally probable beforehand."""
