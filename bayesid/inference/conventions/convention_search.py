@@ -2,7 +2,8 @@
 
 Sets of mistakes are weighed by their evidence under the balance of momentum and by the prior of their families (sets
 grow from the best ones, as in a beam search). Nothing is named unless it explains several times more than the readings
-as declared: an effect that no mistake explains favours none.
+as declared and leaves nothing: what a mistake only halves is an effect that imitates it. Nor is anything named of
+sensors that read no motion, which fits whatever makes the motion vanish.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ __all__ = ["find_conventions", "refuse_conventions"]
 BELIEVED = 0.95  # probability that the named mistakes, or their equals, must hold together
 MENTIONED = 0.04  # smallest probability of a mistake that is named beside its equals
 GAIN = 6.0  # factor by which the mean square of what is unexplained must fall in a sensor
+LEFT = 4.0  # largest mean square that is unexplained with a name, relative to that of any right simulation
 FEWEST_NATS = 5.0  # gain of log probability for which one more mistake is worth trying
 BEAM = 2  # number of sets from which larger ones are made
 DEEPEST = 3  # largest number of mistakes at once
@@ -232,7 +234,11 @@ def _by_balance(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Conventio
         for before, after in zip(declared.fits, best.fits, strict=True)
         for name in before.misfit
     ]
+    leaves_nothing = all(fit.misfit[name] <= LEFT * fit.floors[name] for fit in best.fits for name in fit.misfit)
+    sees_motion = any(fit.signals[name] > GAIN * fit.misfit[name] for fit in best.fits for name in fit.misfit)
     if np.exp(declared.log_weight - total) > 1.0 - BELIEVED or max(explained, default=0.0) < GAIN:
+        return []
+    if not (leaves_nothing and sees_motion):
         return []
     conventions: dict[tuple[str, str], Convention] = {}
     for considered in sorted(weighed, key=lambda considered: -considered.log_weight):

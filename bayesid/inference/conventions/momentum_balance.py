@@ -52,6 +52,8 @@ class BalanceFit(NamedTuple):
         Mean square of the residual of each sensor, with its floor.
     floors : dict of str to float
         What it is at least.
+    signals : dict of str to float
+        Mean square of what there is to explain, about its mean.
     gains : dict of str to float
         Log evidence that would be gained if nothing were left unexplained.
     z : (p,) array
@@ -61,6 +63,7 @@ class BalanceFit(NamedTuple):
     log_evidence: float
     misfit: dict[str, float]
     floors: dict[str, float]
+    signals: dict[str, float]
     gains: dict[str, float]
     z: Floats
 
@@ -152,9 +155,8 @@ class BalanceProblem:
             points = np.concatenate([z[None], z + STEP * np.eye(self.size)[:-6]])
             residuals = self._residuals(points)
             misfit = {name: float((r[0] ** 2).mean()) + self._floors[name] for name, r in residuals.items()}
-            here = BalanceFit(
-                self._evidence(misfit, z), misfit, {name: self._floors[name] for name in misfit}, self._gains(misfit), z
-            )
+            floors, signals = ({name: part[name] for name in misfit} for part in (self._floors, self._signals))
+            here = BalanceFit(self._evidence(misfit, z), misfit, floors, signals, self._gains(misfit), z)
             if best is None or here.log_evidence > best.log_evidence:
                 best = here
             elif iteration and np.linalg.norm(z - best.z) > 1e-3:
@@ -209,18 +211,30 @@ class BalanceProblem:
     @cached_property
     def _floors(self) -> dict[str, float]:
         """Mean square that a residual has at least, by noise and by what any simulation lacks."""
-        generic = float(np.hypot(GENERIC, self.balance.uncertainty))
-        floors = {}
-        for kind, sensor in self.readings.sensors.items():
-            size = float(sensor.values[sensor.present].std(axis=0).max())
-            floors[kind.value] = sensor.sigma**2 + (generic * size) ** 2
-        pairs, rate = self.readings.turns
+        share = GENERIC**2 + self.balance.uncertainty**2
+        floors = {
+            kind.value: sensor.sigma**2 + share * self._signals[kind.value]
+            for kind, sensor in self.readings.sensors.items()
+        }
+        pairs = self.readings.turns[0]
         if len(pairs):
             noise = np.sqrt(2.0) * self.readings.attitude_sigma / float(np.median(np.diff(pairs, axis=1)))
-            floors["attitude"] = noise**2 + (generic * float(rate.std(axis=0).max())) ** 2
+            floors["attitude"] = noise**2 + share * self._signals["attitude"]
             floors["turning"] = floors["attitude"] + floors.get("rate", 0.0)
         floors["start"] = START_ERROR**2 + self.readings.start_sigma**2
         return floors
+
+    @cached_property
+    def _signals(self) -> dict[str, float]:
+        """Variance of the readings of each sensor, of the axis where it is largest."""
+        signals = {
+            kind.value: float(sensor.values[sensor.present].var(axis=0).max())
+            for kind, sensor in self.readings.sensors.items()
+        }
+        pairs, rate = self.readings.turns
+        if len(pairs):
+            signals["attitude"] = signals["turning"] = float(rate.var(axis=0).max())
+        return signals | {"start": 0.0}
 
     @cached_property
     def _scales(self) -> Floats:
