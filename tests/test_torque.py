@@ -128,7 +128,9 @@ def test_encoder_errors_reach_the_torques_as_differences_of_the_simulation(formu
     urdf = ROBOTS["ets7"]
     robot = Robot.from_urdf(urdf)
     state = JointState(*(0.1 * np.random.default_rng(1).normal(size=(3, 4, 6))))
-    environment = Environment(*np.zeros((10, 4)), np.zeros((4, 0, 5)))  # far from everything: what acts is the arm
+    environment = Environment(
+        *np.zeros((10, 4)), np.zeros((4, 0, 5)), np.ones(4), np.zeros(4)
+    )  # far from everything: what acts is the arm
     seen = SampledMotion(np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)), np.zeros((4, 3)), environment)
     response = joint_sensitivity(robot, state, seen, (Sensor(SensorKind.RATE, White(1e-6)),), (1, 4))
     torques = Channels((SensorKind.RATE,), ("joint2", "joint5")).torques

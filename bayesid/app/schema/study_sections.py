@@ -262,6 +262,7 @@ class WheelSection(Section):
     Parameters
     ----------
     name : str
+        Name of the wheel in recordings.
     axis : (3,)
         Unit vector of its axis, base axes.
     inertia : float
