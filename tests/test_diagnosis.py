@@ -59,7 +59,7 @@ def test_a_hidden_wheel_is_named_and_measured(wheel):
 def test_the_size_of_a_diagnosis_is_known_before_it_runs(wheel):
     size = RunSize.of(wheel.before.fit.posterior, wheel.effects)
     columns = sum(item.columns.shape[1] for item in wheel.search.base.bank.signatures)
-    assert size.shared + size.local == pytest.approx(columns, rel=0.01)
+    assert columns <= size.shared + size.local < 1.05 * columns  # how many shapes of events are proposed, the data say
     assert size.rows == len(wheel.before.fit.residual)
     assert 0.7 < size.memory / 1e9 < 3.0
     assert str(size).startswith("about ")

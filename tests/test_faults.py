@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -129,7 +130,7 @@ def call(*arguments: object, **options: object) -> subprocess.CompletedProcess[s
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False, **options)
 
 
-@pytest.mark.parametrize("command", ["check", "diagnose", "identify"])
+@pytest.mark.parametrize("command", ["check", "identify"])
 def test_degrees_are_refused_before_anything_is_computed(command: str, study: Path, tmp_path: Path) -> None:
     file = copy(study, tmp_path)
     recording = next(tmp_path.glob("*.csv"))
@@ -139,6 +140,18 @@ def test_degrees_are_refused_before_anything_is_computed(command: str, study: Pa
     assert "radians" in done.stderr
     assert "Warning" not in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_degrees_are_the_verdict_of_a_diagnosis(study: Path, tmp_path: Path) -> None:
+    file = copy(study, tmp_path)
+    recording = next(tmp_path.glob("*.csv"))
+    recording.write_text(scale("position.", 180.0 / np.pi)(recording.read_text()))
+    done = call("diagnose", file, "--output", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert found["causes"] == ["convention:unit:position"]
+    assert 'unit = "deg"' in found["conventions"][0]["remedy"]
+    assert "Warning" not in done.stderr
 
 
 @pytest.mark.slow

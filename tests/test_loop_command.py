@@ -94,6 +94,12 @@ DESIGN = {
     "attitude": ("duration = 10.0\nattitude = [1, 0, 0, 0]", lambda p: p.plan.attitude.tolist(), [1.0, 0.0, 0.0, 0.0]),
     "attitude_sigma": ("duration = 10.0\nattitude_sigma = 0.01", lambda p: p.plan.attitude_sigma, 0.01),
     "argument_of_latitude": ("duration = 10.0\nargument_of_latitude = 1.5", lambda p: p.plan.argument_of_latitude, 1.5),
+    "wheel_speed": (
+        "duration = 10.0\nwheel_speed = {spinner = 30.0}\n"
+        "[[robot.wheels]]\nname = 'spinner'\naxis = [0, 0, 1]\ninertia = 1e-3",
+        lambda p: list(p.plan.wheel_speeds),
+        ["spinner"],
+    ),
     "limits": ("duration = 10.0\nlimits = {joint_speed = 0.2}", lambda p: p.limits.joint_speed, 0.2),
 }
 

@@ -381,7 +381,7 @@ def test_a_cause_imitates_itself_and_others_less(biased):
 def test_equivalents_stand_first_among_the_pairs(biased):
     result = replace(biased, classes=(("accel-bias", "wheel-momentum"),))
     first, second, *_ = pair_rows(result.inseparable_pairs[:20])
-    assert [first[1], first[4], second[4]] == ["wheel-momentum", "equivalent", ""]
+    assert [first[1], first[5], second[5]] == ["wheel-momentum", "equivalent", ""]
 
 
 def test_the_disturbance_moves_with_what_drives_it(biased, disturbance):

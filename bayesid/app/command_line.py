@@ -17,6 +17,7 @@ import inspect
 import os
 import pkgutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache, wraps
@@ -140,11 +141,17 @@ def _reported() -> Iterator[None]:
 
 @contextmanager
 def _shown() -> Iterator[Progress]:
-    """Yield a progress that draws a bar, beginning with its first call."""
+    """Yield a progress that draws a bar, beginning with the first call after a second.
+
+    What ends sooner, such as bad input, leaves no bar and no empty line.
+    """
     with ExitStack() as stack:
         update: list[Callable[[float, str], None]] = []
+        begun = time.monotonic()
 
         def show(fraction: float, text: str, /) -> None:
+            if not update and time.monotonic() < begun + 1.0:
+                return
             if not update:
                 update.append(_bar(stack))
             update[0](fraction, text)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from bayesid._math.memory import GIGABYTE, refuse_beyond_memory
 from bayesid.diagnosis.candidates.cause_kind import kind_of
+from bayesid.diagnosis.candidates.event_cause import EventCause
 from bayesid.diagnosis.candidates.generic_cause import generic_columns, instants_of_each
 from bayesid.diagnosis.candidates.instant_cause import INSTANTS, InstantCause
 from bayesid.diagnosis.candidates.linear_cause import group_names
+from bayesid.diagnosis.candidates.shaped_cause import ShapedCause
 from bayesid.diagnosis.candidates.vibration_cause import FREQUENCIES, PAIRS, slosh_entries
 from bayesid.inference.memory_estimate import FEWER
 from bayesid.inference.posterior import Posterior
@@ -30,6 +32,9 @@ BANKS, GRAMS = 1.5, 5.0
 FEWEST, PER_NUMBER, PER_PRODUCT, PER_ENTRY = 4.0, 5e-7, 3e-9, 3e-7
 """Time of the smallest diagnosis, for each number in the columns, for each product of derivatives in the unknowns, and
 for each entry of the Gram [s], measured with 3 and 40 recordings on two cores."""
+
+PROPOSED = 8
+"""Shapes of a cause that the data propose, at most."""
 
 TOGETHER = 64
 """Perturbations that are computed at once."""
@@ -77,6 +82,9 @@ class RunSize:
                 shared[effect.label] = couplings * len(FREQUENCIES)
             elif isinstance(kind_of(effect), InstantCause):
                 local += recordings * amplitudes * instants_of_each(INSTANTS, recordings)
+            elif isinstance(kind_of(effect), ShapedCause):
+                times = recordings if isinstance(kind_of(effect), EventCause) else 1
+                shared[effect.label] = PROPOSED * amplitudes * times
             else:
                 times = recordings if effect.per_recording else 1
                 shared["".join(group_names(effect).values())] = amplitudes * times

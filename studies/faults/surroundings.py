@@ -22,10 +22,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from bayesid._io.errors import InputError
-from bayesid.app import study_to_model
 from bayesid.app.command_line import app
-from bayesid.app.schema import Study
-from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.app.functions import check_study
 
 # file of a user's effect, but for the method that fails
 PLUGIN = '''
@@ -233,7 +231,9 @@ def answer_to(study: Path, change: Spoilt, folder: Path) -> Answer:
         fault = f"exit status {done.exit_code}"
     elif errors < 1 or not done.output.startswith("Error: "):
         fault = "no message"
-    elif (folder / "out").exists():
+    elif {file.name for file in (folder / "out").glob("*")} - {
+        "check.json"
+    }:  # which says of unreadable files what is wrong
         fault = "something is written"
     return Answer(done.exit_code, done.output, ACCEPTED in done.output, fault)
 
@@ -242,11 +242,10 @@ def answer_to(study: Path, change: Spoilt, folder: Path) -> Answer:
 def _reading_alone() -> Iterator[None]:
     """End a command when it has read all files, before anything is compiled."""
 
-    def read(study: Study, window: int | None = None) -> NoReturn:
-        load_manoeuvres(study, load_model(study).robot)
+    def accept(*read: object) -> NoReturn:
         raise InputError(ACCEPTED)
 
-    with patch.object(study_to_model, "load_posterior", read):
+    with patch.object(check_study, "find_conventions", accept):
         yield
 
 
