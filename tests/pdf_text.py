@@ -10,7 +10,7 @@ from pypdf import PdfReader
 
 FOOTER = re.compile(r"\s*\d+\s*/\s*\d+\s*$")
 CAPTION_AT_THE_FOOT = re.compile(r"\nFigure \d+\.(?:(?!\nFigure \d+\.).)*$", re.DOTALL)
-BREAKABLE = re.compile("[\\s\u00ad-]+")
+BREAKABLE = re.compile("[\\s\u00ad\u200b-]+")
 
 
 @dataclass(frozen=True)
