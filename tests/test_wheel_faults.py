@@ -57,7 +57,7 @@ def errors(given: SimpleNamespace, effect=None, values=()) -> np.ndarray:
     model = Model(given.robot, sensors, (BodyPrior("base_link", inertial, 0.1),))
     model = model if effect is None else model.extend(effect)
     motion = MeasuredMotion.from_recording(given.recording, given.robot)
-    posterior = Posterior.of(model, [Manoeuvre(given.recording, motion)], step=0.05)
+    posterior = Posterior.of(model, [Manoeuvre(given.recording, motion, blocks_per_second=0.0)], step=0.05)
     z = np.array(posterior.unknowns.coordinates([inertial], RATE[None]))
     for parameters, value in [(model.effects[0].parameters, values)] if model.effects else []:
         z[-len(parameters) :] = [(x - p.mean) / p.sigma for x, p in zip(value, parameters, strict=True)]
