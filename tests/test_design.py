@@ -116,6 +116,7 @@ def test_optimality_of_the_posterior_in_closed_form(flywheel: Problem) -> None:
     assert costs["information-gain"] == pytest.approx(0.5 * np.log(variances / 0.25).sum(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_information_gain_is_averaged_over_the_prior(flywheel: Problem) -> None:
     criterion = flywheel.criteria[-1]
     points = flywheel.points(criterion, np.random.default_rng(0))
@@ -244,6 +245,7 @@ def test_separation_seeks_the_worst_direction_among_those_that_manoeuvres_show()
     assert adapted_to_family(problem, rng) is problem
 
 
+@pytest.mark.slow
 def test_gradients_are_those_of_finite_differences(flywheel: Problem) -> None:
     rng = np.random.default_rng(6)
     direction, step = rng.normal(size=4), 1e-5
@@ -361,6 +363,7 @@ def test_a_plan_needs_a_frame_that_exists() -> None:
     assert Tip.of(Robot.shipped("ets7")).name == "tip"
 
 
+@pytest.mark.slow
 def test_bodies_marginalised_only_are_not_judged() -> None:
     own = robot("flywheel")
     wheel = BodyPrior("part", own.link("part").inertial, 0.1, nuisance=True)

@@ -675,6 +675,7 @@ def flights(request, without) -> tuple[Flight, Flight]:
     return bare, carrying(bare.model, acting)
 
 
+@pytest.mark.slow
 def test_every_effect_changes_the_readings_and_nothing_where_it_is_absent(flights):
     """All in one simulation: each is there in turn while the others are absent; every overridden hook was called."""
     nothing, with_all = flights
@@ -702,6 +703,7 @@ def test_an_effect_without_parameters_changes_the_readings(without):
         assert {hook for label, hook in CALLED if label == effect.label} == PHYSICS & set(overridden(type(effect)))
 
 
+@pytest.mark.slow
 def test_amplitudes_describe_the_same_effect_where_it_is_small(without):
     """Against the effect at a small size, in the simulation."""
     small = {"joint-flexibility": jnp.array([8.0, 0.03])}

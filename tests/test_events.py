@@ -51,6 +51,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASES))
 def test_pushes_from_outside_are_those_of_mujoco(name, formula_motion):
     """Of the push itself, 2e-4 is that of a contact's finite length; the pulses are as good as the integration."""
@@ -70,6 +71,7 @@ def test_pushes_from_outside_are_those_of_mujoco(name, formula_motion):
         assert np.abs(found[place] - given).max() < 2e-4 * there
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [0.0, 1.0])
 def test_a_snap_exchanges_momentum_with_the_base_as_in_mujoco(kept, formula_motion):
     """MuJoCo is given the reaction ``-h' - w x h`` of the panel's momentum, whose first instant is a sample's."""

@@ -38,6 +38,7 @@ def three(planar_posterior: Callable[..., Posterior]) -> Posterior:
     return Posterior.of(model, flown, step=0.5)
 
 
+@pytest.mark.slow
 def test_packed_derivatives_are_those_of_every_unknown(three: Posterior) -> None:
     """Unknowns of different recordings share columns; here each is differentiated by itself."""
     z = 0.1 * np.random.default_rng(4).normal(size=three.size)
@@ -49,6 +50,7 @@ def test_packed_derivatives_are_those_of_every_unknown(three: Posterior) -> None
         np.testing.assert_allclose(found[place], expected, atol=1e-5 * max(np.abs(expected).max(), 1.0))
 
 
+@pytest.mark.slow
 def test_responses_of_a_part_are_those_of_the_whole(three: Posterior) -> None:
     rng = np.random.default_rng(5)
     z, arrays = 0.1 * rng.normal(size=three.size), three.data.arrays

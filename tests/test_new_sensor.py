@@ -212,6 +212,7 @@ def test_its_faults_go_to_another_process_and_back():
     assert (type(again), again.parameters) == (type(effect), effect.parameters)
 
 
+@pytest.mark.slow
 def test_its_hidden_fault_is_named(flown):
     model, posterior, _ = flown
     (manoeuvre,) = posterior.manoeuvres

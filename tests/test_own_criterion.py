@@ -70,6 +70,7 @@ def test_a_plugin_adds_a_criterion_that_is_searched_with_and_reported(tmp_path):
     assert "which nobody but a test wants" in PdfText.read(tmp_path / "out" / "report.pdf")
 
 
+@pytest.mark.slow
 def test_a_search_follows_the_criterion_within_the_limits(tmp_path):
     (axis,) = load_problem(Study.load(study(tmp_path))).criteria
     problem = Problem(flywheel_plan(), Limits(joint_speed=0.2), (axis,))

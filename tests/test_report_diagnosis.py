@@ -764,6 +764,7 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
         yield read
 
 
+@pytest.mark.slow
 def test_a_report_is_written_where_the_extended_model_cannot_be_simulated(biased, tmp_path, monkeypatch):
     def refuse(after):
         raise InputError("the simulation gives no finite readings")
@@ -782,8 +783,8 @@ SECTIONS = {
     False: ("Evidence", "What could be at work", "Inertial parameters and the disturbance"),
 }
 STATUSES = [
-    *(Status.EXPLAINED, Status.ADEQUATE, Status.UNKNOWN),
-    *(pytest.param(status, marks=pytest.mark.slow) for status in (Status.AMBIGUOUS, Status.UNRESOLVED)),
+    Status.EXPLAINED,
+    *(pytest.param(status, marks=pytest.mark.slow) for status in Status if status is not Status.EXPLAINED),
 ]
 LAST = ("Next experiment and limits", "Assumptions", "Appendix: how firm the verdict is", "Measured and simulated")
 
@@ -791,7 +792,7 @@ LAST = ("Next experiment and limits", "Assumptions", "Appendix: how firm the ver
 @pytest.mark.parametrize("status", STATUSES)
 def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, status):
     result, text = printed(status)
-    named = status in (Status.EXPLAINED, Status.AMBIGUOUS)
+    named = status in (Status.EXPLAINED, Status.PARTLY_EXPLAINED, Status.AMBIGUOUS)
     assert "Träger #1 *bold*" in text
     for number, title in enumerate((*SECTIONS[named], *LAST), start=1):
         assert f"{number} {title}" in text

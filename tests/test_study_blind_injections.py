@@ -284,6 +284,7 @@ def test_the_report_is_written(trials, tmp_path):
     assert broken_rules(tmp_path / "blind.pdf", full=False) == []
 
 
+@pytest.mark.slow
 def test_the_report_is_that_of_the_committed_trials(committed, tmp_path):
     STUDY.write(Campaign(committed, len(plan(full=True))), tmp_path / "blind.pdf")
     assert broken_rules(tmp_path / "blind.pdf") == []
