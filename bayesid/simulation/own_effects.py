@@ -92,7 +92,7 @@ def _trials(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) -> Iterator
     zeros = np.zeros(len(robot.joints))
     motion = Excitation(zeros, zeros + TYPICAL, 1.0)
     tables = time_tables(robot, (), (), motion, TIMES)
-    instant = _instant(tables.known[-1], tables.environment)
+    instant = _instant(tables.known[-1], tables.environment, len(robot.wheels))
     inner = jnp.full(effect.states, TYPICAL)
     count = effect.modes_count
     readings = _readings(robot, sensors)
@@ -123,11 +123,12 @@ def _table(effect: Effect, robot: Robot, motion: Excitation) -> Any:
         raise _fault(effect, "table", f"it fails: {type(error).__name__}: {error}") from error
 
 
-def _instant(row: Any, environment: Environment) -> Instant:
+def _instant(row: Any, environment: Environment, wheels: int) -> Instant:
     """Return an instant at which nothing is zero or singular that need not be, with directions in place of an orbit."""
     now = jax.tree.map(lambda leaf: jnp.asarray(leaf[-1]), environment)
     x, y, z = jnp.eye(3)
-    now = now._replace(zenith=x, velocity=y, sun=x, north=z, gradient=jnp.asarray(1e-6))
+    spinning = jnp.full((wheels, now.wheels.shape[-1]), TYPICAL)
+    now = now._replace(zenith=x, velocity=y, sun=x, north=z, gradient=jnp.asarray(1e-6), wheels=spinning)
     moving = 1e-2 * jnp.array([1.0, -2.0, 1.5])
     return Instant(now, composite(jnp.asarray(row)), jnp.eye(3), moving, moving, moving)
 
