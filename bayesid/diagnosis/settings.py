@@ -32,6 +32,9 @@ class DiagnosisSettings:
         Probability that the alternatives of an ambiguous verdict have together.
     most_alternatives : int
         Alternatives that are named; where more are needed, none is, since a longer list decides nothing.
+    most_beside_unnamed : int
+        Causes that are named where something without a name is at work: more of them are what several of the catalogue
+        make of one effect from outside.
     unknown_from : float
         Probability of something generic above which it is present: the majority.
     remainder_from : float
@@ -93,6 +96,7 @@ class DiagnosisSettings:
     named_from: float = 0.9
     covered: float = 0.95
     most_alternatives: int = 4
+    most_beside_unnamed: int = 2
     unknown_from: float = 0.5
     remainder_from: float = 0.1
     visible_information: float = 1.0

@@ -20,6 +20,9 @@ __all__ = ["BLOCKS_PER_SECOND", "Blocks"]
 BLOCKS_PER_SECOND = 10.0
 """Blocks a second where a study states nothing: five times the fastest vibration or joint that is looked for has."""
 
+LEAST = 200.0
+"""Blocks of a recording at least: what is short, such as a throw of half a second, moves fast."""
+
 WHOLE = 1e-3  # relative excess of an interval over a part of a block that is rounding
 
 
@@ -56,12 +59,15 @@ class Blocks:
         stamps : (n,) array
             Increasing time stamps [s].
         per_second : float
-            Least number of blocks a second; 0 keeps every sample.
+            Least number of blocks a second, and more in a recording that has fewer than `LEAST`; 0 keeps every sample.
         breaks : (k,) array_like
             Instants that no block may hold within [s], such as those at which a known force changes.
         """
         interval = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
-        most = int((1.0 + WHOLE) / (per_second * interval)) if per_second > 0.0 else 1
+        most = 1
+        if per_second > 0.0 and len(stamps) > 1:
+            least = max(per_second, LEAST / float(stamps[-1] - stamps[0]))
+            most = int((1.0 + WHOLE) / (least * interval))
         if most < 2:
             ones = np.ones(len(stamps), dtype=int)
             pairs = np.repeat(stamps[:, None], 2, axis=1)

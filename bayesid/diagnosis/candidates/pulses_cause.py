@@ -24,8 +24,9 @@ DUTIES = (0.05, 0.3)
 PHASES = 12
 """First pulses that are tried in each recording, evenly within the first period."""
 
-FEWEST, FINEST = 3.0, 20.0
-"""Fewest pulses in the longest recording, and most, which the cosines of a torque still resolve."""
+FEWEST, FINEST = 5.0, 20.0
+"""Fewest pulses in the longest recording, since fewer are kicks of their own, and most, which the cosines of a torque
+still resolve."""
 
 COMBINED = 48
 """Combinations of first pulses over which the likelihood of a train is averaged."""

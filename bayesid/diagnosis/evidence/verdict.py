@@ -127,7 +127,8 @@ def probable_verdict(
       candidates hold the majority and may imitate a part of it, the classes that have 0.9.
     - partly-explained: the same, and something generic has more: what remains is undecided up to 0.5, then present.
       Also where classes of 0.9 stand beside causes that are too many to name.
-    - unknown: generic candidates hold the majority, and no class has 0.9.
+    - unknown: generic candidates hold the majority, and no class has 0.9, or more than two have: several that leave
+      the majority unexplained are what the catalogue offers for one effect from outside.
     - ambiguous: two to four alternatives hold 0.95. They are merged sets, taken in the order of their probability; each
       holds whatever includes it, so that the many improbable companions of a cause count for it and not against it, and
       what an earlier one holds is no alternative of its own. Nothing and the unknown may be among them.
@@ -152,7 +153,8 @@ def probable_verdict(
     best = next((names for names in merged if UNKNOWN not in names), frozenset[str]())
     named, others = best if best <= certain else frozenset[str](), list[frozenset[str]]()
     if remainder.verdict is Rest.PRESENT:
-        named, status = certain, Status.PARTLY_EXPLAINED if certain else Status.UNKNOWN
+        named = certain if len(certain) <= settings.most_beside_unnamed else frozenset()
+        status = Status.PARTLY_EXPLAINED if named else Status.UNKNOWN
     elif named:
         status = Status.EXPLAINED if remainder.verdict is Rest.NONE else Status.PARTLY_EXPLAINED
     else:
