@@ -20,7 +20,7 @@ __all__ = ["BLOCKS_PER_SECOND", "Blocks"]
 BLOCKS_PER_SECOND = 10.0
 """Blocks a second where a study states nothing: five times the fastest vibration or joint that is looked for has."""
 
-LEAST = 200.0
+LEAST = 100.0
 """Blocks of a recording at least: what is short, such as a throw of half a second, moves fast."""
 
 WHOLE = 1e-3  # relative excess of an interval over a part of a block that is rounding
