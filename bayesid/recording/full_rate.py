@@ -128,8 +128,8 @@ def channel_spectrum(
     count, interval = len(time), float(np.median(np.diff(time)))
     block_rate = 1.0 / (interval * max(1, round(count / blocks)))
     length = max(8, min(LONGEST_PIECE, 2 * count // PIECES))
-    frequency, power = signal.welch(
-        np.asarray(values, dtype=np.float64), 1.0 / interval, nperseg=min(length, count), detrend="linear"
+    frequency, power = signal.welch(  # type: ignore[call-overload]  # its stubs lack the linear detrending
+        values, 1.0 / interval, nperseg=min(length, count), detrend="linear"
     )
     pieces = max(1.0, INDEPENDENT * (2 * count // len(values[:length]) - 1))
     inside = slice(1, len(frequency) - 1)
