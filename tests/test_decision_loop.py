@@ -124,6 +124,8 @@ def test_the_best_set_to_fit_has_one_form_and_nothing_generic():
     found = sets((("a", "b"), None, 30.0), (("a",), "anything", 40.0), (("u",), None, 20.0))
     assert relinearise._best_known(found, CATALOGUE) == ("a", "b")
     assert relinearise._best_known(sets(*SETS[1:]), CATALOGUE) == ()
+    large = sets((("a",), None, 60.0), (("a", "u"), None, 70.0))
+    assert relinearise._best_known(large, CATALOGUE) == ("a",)  # about its fit the vibration is weighed anew
     jump = MassShift((1.0,))
     found = SetProbabilities.of([CauseSet((jump.label,), None, 9.0)], (jump.label,), (), CausePrior())
     assert relinearise._best_known(found, replace(CATALOGUE, effects=(jump,))) == ()

@@ -185,7 +185,8 @@ def _weighted(parameterisation: Parameterisation, y: Floats, log_weights: Floats
     inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
     weights, pareto_k = np.exp(log_weights - top), np.inf
-    if np.count_nonzero(log_weights > top - 700.0) > 3.0 * np.sqrt(draws):  # they fill the tail that is fitted
+    tail = min(draws / 5.0, 3.0 * np.sqrt(draws))  # is fitted, by a distribution that five values at least determine
+    if tail > 5.0 and np.count_nonzero(log_weights > top - 700.0) > tail:
         smoothed, pareto_k = array_stats.psislw(-log_weights)  # which takes log likelihoods and inverts them
         weights = np.exp(smoothed)
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)

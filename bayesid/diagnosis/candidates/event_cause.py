@@ -49,6 +49,11 @@ class EventCause(ShapedCause):
             for place in (np.arange(count) + 0.5) / count
         ]
 
+    def of_recording(self, trial: Effect, recording: int) -> Effect:
+        """Return the event of one recording."""
+        events = cast(Events, trial)
+        return events.with_events([event for event in events.events if event.recording == recording])
+
     def proposals(self, point: Linearisation, effect: Effect, causes: Sequence[str]) -> list[ShapeProposal]:
         """Return the events that earn their places, the best by itself and all together."""
         events = cast(Events, effect)

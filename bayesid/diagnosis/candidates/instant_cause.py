@@ -122,8 +122,11 @@ class InstantCause(CauseKind):
         for effect in effects:
             if found.inclusion[effect.label] >= least:
                 best = next(item for item in found.sets if effect.label in item.causes)
-                others = [name for name in best.causes if name != effect.label]
-                point = self._tuned(point, effect, others, bounds[effect.label])
+                others = tuple(name for name in best.causes if name != effect.label)
+                events = {item.effect.candidate for item in point.bank.signatures if item.effect is not None}
+                # an event among them may stand for the jump of a recording in which the grid has none
+                for company in {others: None, tuple(name for name in others if name not in events): None}:
+                    point = self._tuned(point, effect, company, bounds[effect.label])
         return point
 
     def with_form(self, effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:
@@ -197,8 +200,10 @@ class InstantCause(CauseKind):
             return point
         share = _share(samples, len(ends))
         instants = tuple(np.inf if instant is None else instant for instant in chosen)
-        columns = self.responses(point.perturbed, point.fit, effect, np.array(instants)[:, None])[:, 0]
         name = f"{effect.label} at {', '.join(f'{instant:.5g}' for instant in instants)} s"
+        if any(signatures.name == name for signatures in point.bank.signatures):  # sought beside others before
+            return point
+        columns = self.responses(point.perturbed, point.fit, effect, np.array(instants)[:, None])[:, 0]
         item = Signatures(name, columns.reshape(-1, columns.shape[-1]), instants=instants)
         cause = next(cause for cause in point.bank.causes if cause.name == effect.label)
         tuned = replace(

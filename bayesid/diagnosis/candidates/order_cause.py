@@ -47,6 +47,7 @@ class OrderLineCause(CauseKind):
     """Causes whose effect has an order as a constant, and else is linear in amplitudes of each recording."""
 
     name = "order-line"
+    linearised_beside = True
 
     def signatures(
         self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds

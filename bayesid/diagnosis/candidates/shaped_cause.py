@@ -101,6 +101,10 @@ class ShapedCause(CauseKind):
         """
         raise NotImplementedError
 
+    def of_recording(self, trial: Effect, recording: int) -> Effect:
+        """Return what a form of the bank that stands for one in each recording is in one of them."""
+        raise NotImplementedError
+
     def proposals(self, point: Linearisation, effect: Effect, causes: Sequence[str]) -> list[ShapeProposal]:
         """Return the shapes that are worth tuning beside some causes."""
         raise NotImplementedError
@@ -132,9 +136,9 @@ class ShapedCause(CauseKind):
                 parts = list(enumerate(by_recording(fit.posterior, columns))) if apart else [(None, columns)]
                 for recording, part in parts:
                     where = "" if recording is None else f" in recording {recording + 1}"
-                    parts_of_form, groups = _form(
-                        f"{effect.label} #{number + 1}{where}", trial, part, bounds[effect.label]
-                    )
+                    one = trial if recording is None else self.of_recording(trial, recording)
+                    label = f"{effect.label} #{number + 1}{where}"
+                    parts_of_form, groups = _form(label, one, part, bounds[effect.label])
                     signatures += [replace(signature, recording=recording) for signature in parts_of_form]
                     forms.append(groups)
             causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:])))

@@ -189,16 +189,19 @@ def _with_suggested(point: Linearisation) -> Linearisation:
 
 
 def _best_known(probabilities: SetProbabilities, catalogue: Catalogue) -> tuple[str, ...]:
-    """Return the most probable set that names all of its causes, but for those that it is linearised beside.
+    """Return those of the most probable set that names all of its causes about whose fit the model is linearised.
 
-    None where one of the others has several forms.
+    They have one form. None where another has several forms and these are not so large by themselves that the linear
+    model may be wrong about all others.
     """
-    best = next(
-        (cause_set.causes for cause_set in probabilities.sets if cause_set.causes and cause_set.generic is None), ()
-    )
-    beside = {effect.label for effect in catalogue.effects if kind_of(effect).linearised_beside}
-    best = tuple(name for name in best if name not in beside)
-    return best if all(kind_of(effect).one_form for effect in catalogue.effects if effect.label in best) else ()
+    known = {cause_set.causes: cause_set.log_evidence for cause_set in probabilities.sets if cause_set.generic is None}
+    best = next((causes for causes in known if causes), ())
+    kinds = {effect.label: kind_of(effect) for effect in catalogue.effects}
+    best = tuple(name for name in best if name not in kinds or not kinds[name].linearised_beside)
+    certain = tuple(name for name in best if name not in kinds or kinds[name].one_form)
+    if certain == best or known.get(certain, 0.0) > catalogue.settings.cannot_be_left_out:
+        return certain
+    return ()
 
 
 def plausible_vibrations(probabilities: SetProbabilities, catalogue: Catalogue) -> bool:
