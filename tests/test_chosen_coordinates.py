@@ -77,3 +77,26 @@ def test_weights_without_a_tail_are_not_trusted():
     few = np.full(1000, -800.0)
     few[:3] = 0.0
     assert _weighted(SimpleNamespace(to_z=lambda y: y), np.zeros((1000, 1)), few).pareto_k == np.inf
+
+
+@pytest.mark.parametrize("draws", [1, 2, 26, 29, 30, 224, 225, 512, 1000])
+@pytest.mark.parametrize("case", ["equal", "nearly equal", "some above", "equal tail", "few finite", "none", "spread"])
+def test_no_weights_stop_the_sampling(draws: int, case: str):
+    """ArviZ raises errors of tails without spread or of few draws, or divides by zero there, as its version has it."""
+    rng = np.random.default_rng(4)
+    random = rng.normal(size=draws)
+    largest = np.argsort(random)[-max(1, draws // 3) :]
+    logarithms = {
+        "equal": np.full(draws, -3.0),
+        "nearly equal": -3.0 + 1e-17 * random - 1e-300,
+        "some above": np.where(random > 1.5, 1e-16, 0.0),
+        "equal tail": np.where(np.isin(np.arange(draws), largest), 5.0, random - 4.0),
+        "few finite": np.where(np.isin(np.arange(draws), largest[:4]), random, -np.inf),
+        "none": np.full(draws, -np.inf),
+        "spread": 400.0 * random,
+    }[case]
+    drawn = _weighted(SimpleNamespace(to_z=lambda y: y), np.zeros((draws, 1)), logarithms)
+    assert np.isfinite(drawn.weights).all()
+    assert drawn.weights.sum() == pytest.approx(1.0)
+    assert not np.isnan(drawn.pareto_k)
+    assert drawn.trusted <= (case == "some above")  # by the last digit, and bounded

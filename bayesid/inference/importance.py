@@ -185,11 +185,29 @@ def _weighted(parameterisation: Parameterisation, y: Floats, log_weights: Floats
     inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
     weights, pareto_k = np.exp(log_weights - top), np.inf
-    tail = min(draws / 5.0, 3.0 * np.sqrt(draws))  # is fitted, by a distribution that five values at least determine
-    if tail > 5.0 and np.count_nonzero(log_weights > top - 700.0) > tail:
-        smoothed, pareto_k = array_stats.psislw(-log_weights)  # which takes log likelihoods and inverts them
-        weights = np.exp(smoothed)
+    if _has_tail(weights) and np.count_nonzero(log_weights > top - 700.0) > _tail_length(draws):
+        smoothed, fitted = array_stats.psislw(-log_weights)  # which takes log likelihoods and inverts them
+        if np.isfinite(fitted) and np.isfinite(smoothed).all():
+            weights, pareto_k = np.exp(smoothed), fitted
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
+
+
+def _tail_length(draws: int) -> int:
+    """Return the number of the largest weights to which a generalised Pareto distribution is fitted."""
+    return int(min(draws / 5.0, 3.0 * np.sqrt(draws)))
+
+
+def _has_tail(weights: Floats) -> bool:
+    """Whether the largest weights determine such a fit: six or more, whose first quartile is above the smallest.
+
+    ArviZ raises or divides by zero otherwise, as its version has it.
+    """
+    count = _tail_length(len(weights))
+    quartile = int(count / 4.0 + 0.5) - 1
+    if quartile < 1:
+        return False
+    tail = np.sort(weights)[-count:]
+    return bool(tail[quartile] > tail[0])
 
 
 def choose_parameterisation(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Parameterisation:
