@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.recording import recording as recording_module
 from bayesid.recording.recording import Recording
 
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
@@ -185,8 +186,10 @@ WRONG_CSV = {
 }
 
 
+@pytest.mark.parametrize("size", [0, recording_module.LARGE], ids=["large", "small"])
 @pytest.mark.parametrize(("text", "fragments"), WRONG_CSV.values(), ids=WRONG_CSV)
-def test_a_wrong_csv_is_named_with_place_value_and_remedy(tmp_path, text, fragments):
+def test_a_wrong_csv_is_named_with_place_value_and_remedy(tmp_path, monkeypatch, text, fragments, size):
+    monkeypatch.setattr(recording_module, "LARGE", size)
     path = tmp_path / "wrong.csv"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
@@ -195,6 +198,19 @@ def test_a_wrong_csv_is_named_with_place_value_and_remedy(tmp_path, text, fragme
     assert caught.value.remedy
     for fragment in fragments:
         assert fragment in str(caught.value)
+
+
+def test_a_large_csv_is_read_at_once_to_the_same_numbers(tmp_path, time, channels, monkeypatch):
+    path = tmp_path / "large.csv"
+    Recording("memory", None, time, channels).write(path)
+    cell_by_cell = Recording.read(path)
+    monkeypatch.setattr(recording_module, "LARGE", 0)
+    monkeypatch.setattr(recording_module, "_numbers", None)  # no cell by itself
+    at_once = Recording.read(path)
+    np.testing.assert_array_equal(at_once.time, cell_by_cell.time)
+    assert list(at_once.channels) == list(cell_by_cell.channels)
+    for name, values in cell_by_cell.channels.items():
+        np.testing.assert_array_equal(at_once.channels[name], values)
 
 
 def test_the_unbroken_csv_is_fine(tmp_path):

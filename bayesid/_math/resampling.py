@@ -5,9 +5,9 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid._math.arrays import Traceable
+from bayesid._math.arrays import Floats, Traceable
 
-__all__ = ["hermite", "resampled"]
+__all__ = ["hermite", "hermite_weights", "resampled"]
 
 
 def resampled(at: Array, time: Array, values: Array) -> Array:
@@ -73,3 +73,15 @@ def hermite(
     return left + s * (
         left_slope + s * (3.0 * jump - 2.0 * left_slope - right_slope + s * (left_slope + right_slope - 2.0 * jump))
     )
+
+
+def hermite_weights(s: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the weights of both values and of both slopes in `hermite` at fractions of an interval.
+
+    Parameters
+    ----------
+    s : array
+        Fraction of the interval, from 0 to 1.
+    """
+    rest = 1.0 - s
+    return rest**2 * (1.0 + 2.0 * s), s**2 * (1.0 + 2.0 * rest), s * rest**2, -(s**2) * rest

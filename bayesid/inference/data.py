@@ -470,7 +470,7 @@ class RecordedSamples:
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
         return sensor.noise.sigma(self.blocks[kind.value].interval)
 
-    def noise_model(self, robot: Robot, seen: SampledMotion) -> SampleNoise:
+    def noise_model(self, robot: Robot, seen: SampledMotion, window: int | None = None) -> SampleNoise:
         """Return the second moments of the errors.
 
         Parameters
@@ -479,6 +479,8 @@ class RecordedSamples:
             Robot whose dynamics carries the encoders' noise to the sensors.
         seen : SampledMotion
             Motion of the base on the grid.
+        window : int, optional
+            Number of earlier blocks that samples are conditioned on, where it is known.
         """
         torque_sigma = () if self.torque_sensor is None else self.torque_sensor.sigma
         channels = [channel for sensor in self.sensors for channel in self._noise_channels(sensor)]
@@ -493,7 +495,8 @@ class RecordedSamples:
             return SampleNoise(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
         torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
         sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
-        lags = min(max(whitening.WINDOWS), len(self.time) - 1)
+        alone = window == 0 and all(sensor.filter == Filter() for sensor in self.sensors)
+        lags = 0 if alone else min(max(whitening.WINDOWS), len(self.time) - 1)
         covariance = self.wheels.lag_covariance(self.time, lags)
         if isinstance(self.motion, MeasuredMotion):
             covariance = np.concatenate([self.motion.lag_covariance(self.time, lags), covariance])

@@ -16,7 +16,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
-from bayesid._math.resampling import hermite
+from bayesid._math.resampling import hermite_weights
 from bayesid._math.runge_kutta import STAGE_TIMES, TABLEAU
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Numbers, Perturbation, Structure, Traced, perturbed
@@ -183,10 +183,12 @@ class LinearResponses:
         first, last = (size * (slopes[stage] + left @ carried[stage]) for stage in (0, -1))
         row = np.arange(len(samples))[:, None]
         fraction = np.asarray(grid.fraction)[..., None, None]
-        ends = [part[row, samples] for part in (left, right, first, last)]
-        there = hermite(ends[0], ends[1], ends[2], ends[3], fraction)
+        there = np.zeros((*samples.shape, *states.shape[2:]))
+        for part, weight in zip((left, right, first, last), hermite_weights(fraction), strict=True):
+            at_samples = part[row, samples]
+            there += np.multiply(at_samples, weight, out=at_samples)
         readings = there @ np.swapaxes(motion.reading_state, -1, -2)
-        readings = readings + _changed_by(motion.reading_input, perturbations.sample_rows, perturbations.sample_wrench)
+        readings += _changed_by(motion.reading_input, perturbations.sample_rows, perturbations.sample_wrench)
         return np.moveaxis(readings, -2, 0)
 
 

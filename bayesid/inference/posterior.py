@@ -352,5 +352,5 @@ def whiten(
         environment = jax.tree.map(lambda x, s=samples: s.averaged(np.asarray(x)), grid.sample.environment)
         seen = SampledMotion(attitude, samples.averaged(rates[index, :count]), environment)
         window = None if windows is None else windows[index]
-        result.append(whitening.build(samples.noise_model(robot, seen), window))
+        result.append(whitening.build(samples.noise_model(robot, seen, window), window))
     return result

@@ -12,6 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.data import Data
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
+from bayesid.recording.blocks import Blocks
 from bayesid.recording.full_rate import ChannelSpectrum, channel_spectrum, spikes
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
@@ -289,7 +290,7 @@ def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]
 
 def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
     motion = manoeuvre.motion
-    time = manoeuvre.recording.time
+    time = Blocks.of(manoeuvre.recording.time, manoeuvre.blocks_per_second).time
     state = motion.evaluate(time)
     checks = []
     for index, joint in enumerate(robot.joints):

@@ -262,7 +262,7 @@ def _whiten(noise: SampleNoise, blocks: list[tuple[int, list[_Output]]], window:
     width = max(spans[number][1] - starts[number] + 1 for number in range(len(blocks)))
     weights = np.zeros((len(blocks), channels, width, channels))
     present = np.zeros((len(blocks), channels), dtype=bool)
-    covariance = _Covariance(noise)
+    covariance = _Covariance(noise, width - 1)
     log_sigmas = np.zeros(present.shape)
     for local, numbers in _alike(blocks, starts, window, channels):
         group = blocks[numbers[0]][1]
@@ -373,9 +373,9 @@ def _is_coloured(noise: SampleNoise) -> bool:
 class _Covariance:
     """Covariance of the residual between rows of the sample grid: sensors' noise and errors of the joint motion."""
 
-    def __init__(self, noise: SampleNoise) -> None:
+    def __init__(self, noise: SampleNoise, lags: int) -> None:
         self._noise = noise
-        self._lags = noise.joint_covariance.shape[1] - 1
+        self._lags = min(noise.joint_covariance.shape[1] - 1, lags)
         count, self._channels = noise.sensitivity.shape[2:]
         self._blocks = np.zeros((self._lags + 1, count, self._channels, self._channels))
         g = noise.sensitivity

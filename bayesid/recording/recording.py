@@ -32,6 +32,9 @@ Array = Floats
 
 MINIMUM_ROWS = 8  # number of rows below which a motion is not determined
 ABSURD = 1e9  # size above which no sample can be a measurement in SI units
+LARGE = (
+    4e6  # size of a text file above which it is read at once, as columns of plain numbers, if it is nothing else [B]
+)
 NORM_TOLERANCE = 1e-3  # deviation of a quaternion's norm from one above which it is taken for an error
 
 
@@ -358,6 +361,8 @@ def _check_names(columns: Sequence[str], file: Path | str) -> None:
 
 
 def _read_csv(file: Path) -> dict[str, Array]:
+    if file.stat().st_size > LARGE and (columns := _read_plain_csv(file)) is not None:
+        return columns
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.reader(stream, strict=True))
@@ -383,6 +388,36 @@ def _read_csv(file: Path) -> dict[str, Array]:
         name: calendar if name == "time" and calendar is not None else _numbers(cells, name, file, _parse, missing="")
         for name, cells in columns.items()
     }
+
+
+def _read_plain_csv(file: Path) -> dict[str, Array] | None:
+    """Return the columns of a file of nothing but finite numbers and empty cells, None where anything else is there."""
+    import pyarrow as pa  # here, as sensors import this module and small files need none
+    from pyarrow import csv as plain
+
+    try:
+        with file.open(encoding="utf-8-sig") as stream:
+            header = [name.strip() for name in next(csv.reader(stream, strict=True), [])]
+        table = plain.read_csv(
+            file,
+            plain.ReadOptions(column_names=header, skip_rows=1),
+            plain.ParseOptions(ignore_empty_lines=False),
+            plain.ConvertOptions(column_types=dict.fromkeys(header, pa.float64()), null_values=[""]),
+        )
+    except (UnicodeDecodeError, csv.Error, pa.ArrowException, OSError):
+        return None  # read cell by cell, it says where and why
+    if not table.num_rows:
+        return None
+    _check_names(header, file)
+    columns = {name: _plain_numbers(column) for name, column in zip(header, table.columns, strict=True)}
+    clear = all(values is not None for values in columns.values()) and not table["time"].null_count
+    return {name: values for name, values in columns.items() if values is not None} if clear else None
+
+
+def _plain_numbers(column: Any) -> Array | None:
+    """Return a column of an Arrow table as floating-point numbers, NaN where null; None where one is not finite."""
+    values = np.array(column.cast("float64", safe=False).to_numpy(), dtype=float)
+    return values if int(np.isfinite(values).sum()) == len(values) - column.null_count else None
 
 
 def _read_parquet(file: Path) -> dict[str, Array]:
@@ -421,7 +456,8 @@ def _typed(column: Any, name: str, file: Path) -> Array:
             place=f"column '{name}'",
             remedy=_TIMES if name == "time" else "Write it as floating-point numbers in SI units, null for no sample",
         )
-    return _numbers(column.to_pylist(), name, file, _number, missing=None)
+    plain = None if name == "time" and column.null_count else _plain_numbers(column)
+    return _numbers(column.to_pylist(), name, file, _number, missing=None) if plain is None else plain
 
 
 def _check_rows(rows: int, file: Path) -> None:

@@ -135,9 +135,10 @@ def _of_columns(recording: Recording, columns: tuple[str, ...]) -> Iterator[Susp
         start, end = float(time[rows[0]]), float(time[rows[-1]])
         yield SuspectReadings(Suspicion.FILLED, columns, start, end, len(rows), value=value)
         return
-    for row, length in zip(first, lengths, strict=True):
+    repeated = lengths > 1
+    for row, length in zip(first[repeated], lengths[repeated], strict=True):
         jump = min(steps[place] if 0 <= place < len(steps) else 0.0 for place in (row - 1, row + length - 1))
-        if length > 1 and jump > JUMP * _nearby(steps, row, length) > 0.0:
+        if jump > JUMP * _nearby(steps, row, length) > 0.0:
             kind = Suspicion.FILLED
         elif length > max(FEWEST, LONGEST * len(time)) and not columns[0].startswith("position"):  # joints may rest
             kind = Suspicion.CONSTANT

@@ -118,10 +118,13 @@ def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] =
         if name not in leave_out and link.inertial.mass > 0.0:
             body = link.placement @ link.inertial.pseudo_inertia @ link.placement.T
             carried[link.joint] = carried.get(link.joint, np.zeros((4, 4))) + body
-    rows: Floats = np.zeros((len(motion.pose), WIDTH))
+    xp = namespace(motion.pose)
+    fixed = carried.pop(-1, np.zeros((4, 4)))  # what the base carries stays where it is
+    whole = xp.zeros((len(motion.pose), 4, 12)) + np.concatenate([fixed, np.zeros((4, 8))], axis=1)
     for joint, moments in carried.items():
-        rows = rows + _moments(*joint_motion(motion, joint), moments[None])[:, 0]
-    return rows
+        moved = xp.concatenate([xp.swapaxes(part, 1, 2) for part in joint_motion(motion, joint)], axis=2)
+        whole = whole + (motion.pose[:, joint].reshape(-1, 4) @ moments).reshape(-1, 4, 4) @ moved
+    return _rows_of_moments(whole[..., :4], whole[..., 4:8], whole[..., 8:])
 
 
 class Screws(NamedTuple):

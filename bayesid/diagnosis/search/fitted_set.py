@@ -235,6 +235,9 @@ def extended_posterior(
         If one of its effects is not carried into the torques.
     """
     fit = hypothesis.fit
+    complete = not any(mask.any() for mask in fit.posterior.data.left_out)
+    if complete and torque is None and not (fit.effects or added or hypothesis.perturbed.frozen.size):
+        return fit.posterior
     model = replace(fit.posterior.model, torque=torque)
     for effect in (*(effect.tuned(fit.values(index)) for index, effect in enumerate(fit.effects)), *added):
         model = model.extend(effect)
