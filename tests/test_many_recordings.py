@@ -140,9 +140,9 @@ class CutPrior:
 def test_a_proposal_is_fitted_to_a_prior_that_data_cut_off() -> None:
     """Mean and variance of half a normal are known; the first proposal, three times too narrow, is worth little."""
     target, rng = CutPrior(), np.random.default_rng(6)
-    start = target.proposal(SimpleNamespace(z=np.zeros(target.size)))
-    first = effective_share(target, start, rng)
-    adapted = adapted_proposal(target, start, rng)
+    optimum = SimpleNamespace(z=np.zeros(target.size))
+    first = effective_share(target, target.proposal(optimum), rng)
+    adapted = adapted_proposal(target, optimum, rng)
     assert adapted is not None
     assert first < 0.1 < effective_share(target, adapted, rng)
     y = adapted.draw(20000, rng)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, smooth
 
 SIGMA = 1e-5
@@ -224,3 +225,17 @@ def test_time_units_and_offsets_do_not_matter():
     here = smooth([samples(1, TIME)])
     shifted = smooth([JointSamples(0, TIME + 1000.0, samples(1, TIME).value, SIGMA)])
     np.testing.assert_allclose(shifted.evaluate(TIME + 1000.0)[0], here.evaluate(TIME)[0], atol=0.05 * SIGMA)
+
+
+def test_equal_readings_are_a_joint_at_rest_beside_others_that_move():
+    """Rounding of a position of 0.2 rad would else be a motion, from which bodies without motion are identified."""
+    time, rng = np.arange(0.0, 60.0, 0.1), np.random.default_rng(4)
+    moving = JointSamples(0, time, 0.1 * np.sin(0.2 * time) + 1e-6 * rng.normal(size=len(time)), 1e-6)
+    at_rest = JointSamples(0, time, np.full(len(time), 0.2), 1e-6)
+    still, moved = smooth_joints([[at_rest], [moving]])
+    position, velocity, acceleration = still.evaluate(time)
+    np.testing.assert_allclose(position, 0.2, rtol=1e-14)
+    assert np.abs(velocity).max() < 1e-9
+    assert np.abs(acceleration).max() < 1e-9
+    assert still.jumps == ()
+    assert np.abs(moved.evaluate(time)[1] - 0.02 * np.cos(0.2 * time)).max() < 1e-4

@@ -17,13 +17,13 @@ from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.ensemble import Proposal
+from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import Parameterisation, StudentT
-from bayesid.inference.posterior import Posterior
 
-__all__ = ["FEW", "about_prior", "adapted_proposal", "effective_share"]
+__all__ = ["adapted_proposal", "effective_share"]
 
-DRAWS, ROUNDS, FEW = 1500, 16, 3
-"""Draws in one round, most rounds, and those that show whether the posterior is nearly the prior."""
+DRAWS, ROUNDS = 1500, 16
+"""Draws in one round, and most rounds."""
 
 PER_UNKNOWN = 20.0
 """Effective draws for each unknown from which mean and covariance are taken."""
@@ -50,40 +50,20 @@ def effective_share(
     return _effective(_finite(parameterisation.log_density(y) - proposal.log_density(y))) / draws
 
 
-def about_prior(posterior: Posterior) -> StudentT:
-    """Return the Student-t of the posterior that is linear about the prior's centre.
-
-    Recordings without motion hardly move bodies from their prior, while the mode fits noise by a body that few of all
-    that are possible resemble.
-
-    Parameters
-    ----------
-    posterior : Posterior
-    """
-    z = posterior.starting_point()
-    slopes = posterior.jacobian(z)
-    covariance = np.linalg.inv(slopes.T @ slopes)
-    return StudentT.about(z - covariance @ (slopes.T @ posterior.least_squares(z)), covariance)
-
-
-def adapted_proposal(
-    parameterisation: Parameterisation, first: StudentT, rng: np.random.Generator, rounds: int = ROUNDS
-) -> StudentT | None:
+def adapted_proposal(parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator) -> StudentT | None:
     """Return a Student-t that is fitted to the posterior, the best of all rounds, or None where none is of use.
 
     Parameters
     ----------
     parameterisation : Parameterisation
-    first : StudentT
-        Where the first round draws, such as about the mode.
+    optimum : Optimum
+        Mode of the posterior and its Laplace approximation, where the first round draws.
     rng : numpy.random.Generator
-    rounds : int
-        Most rounds; with fewer than all, the share of effective draws must be good enough.
     """
-    proposal = best = first
+    proposal = best = parameterisation.proposal(optimum)
     most = 0.0
-    goal = min(PER_UNKNOWN * len(first.mean), 0.3 * DRAWS)
-    for _ in range(rounds):
+    goal = min(PER_UNKNOWN * len(optimum.z), 0.3 * DRAWS)
+    for _ in range(ROUNDS):
         y = proposal.draw(DRAWS, rng)
         log_weights = _finite(parameterisation.log_density(y) - proposal.log_density(y))
         effective = _effective(log_weights)
@@ -97,7 +77,7 @@ def adapted_proposal(
         spread = (y - mean) * np.sqrt(weights)[:, None]
         upper = np.asarray(np.linalg.qr(spread, mode="r"))
         proposal = replace(proposal, mean=mean, factor=upper.T * np.sign(np.diag(upper)))
-    return best if most >= (LEAST if rounds == ROUNDS else ENOUGH) * DRAWS else None
+    return best if most >= LEAST * DRAWS else None
 
 
 def _finite(log_weights: Floats) -> Floats:

@@ -111,8 +111,10 @@ class CollapsedProposal:
     def log_marginal(self, wide: Floats) -> Floats:
         """Return the log density over z of the widely known bodies, up to a constant, shape (count, b) -> (count,)."""
         away = self.unknowns.to_linear(self._with(wide))[:, self.wide] - self._centre[self.wide]
-        quadratic = ((away @ self.curvature) * away).sum(axis=1)
-        return -0.5 * (wide**2).sum(axis=1) - away @ self.slope - 0.5 * quadratic
+        with np.errstate(all="ignore"):  # bodies too heavy for a number
+            quadratic = ((away @ self.curvature) * away).sum(axis=1)
+            value = -0.5 * (wide**2).sum(axis=1) - away @ self.slope - 0.5 * quadratic
+        return np.where(np.isfinite(value), value, -np.inf)
 
     @cached_property
     def _centre(self) -> Floats:

@@ -19,7 +19,7 @@ from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
-from bayesid.inference.adapted_proposal import FEW, about_prior, adapted_proposal, effective_share
+from bayesid.inference.adapted_proposal import adapted_proposal, effective_share
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
     BodyDraws,
@@ -450,27 +450,19 @@ def identify(
     target = SamplingTarget(refined, optimum, parameterisation, nearly, evidence.trusted)
     if evidence.effective_samples < NEARLY_NORMAL * evidence.evaluations:
         progress(0.0, "looking for a proposal")
-        target = _with_better_proposal(target, rng, effective_samples)
+        linear = LinearParameterisation(refined)
+        proposal = collapsed_proposal(refined, optimum, rng, effective_samples)
+        if proposal is not None and effective_share(linear, proposal, rng) < WORTHLESS:
+            proposal = None
+        if proposal is not None:
+            target = SamplingTarget(refined, optimum, linear, proposal, True)
+        elif not evidence.trusted:
+            simple = LogCholeskyParameterisation(refined)
+            adapted = adapted_proposal(simple, optimum, rng)
+            target = target if adapted is None else SamplingTarget(refined, optimum, simple, adapted, True)
     chosen: Sampler = Emcee(max_steps, file) if sampler is None else sampler
     drawn = chosen.sample(
         target, np.random.default_rng(walkers), effective_samples=effective_samples, progress=progress
     )
     chains = drawn if isinstance(drawn, Chains) else chains_of(refined, drawn, rng, effective_samples)
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)
-
-
-def _with_better_proposal(target: SamplingTarget, rng: np.random.Generator, effective_samples: float) -> SamplingTarget:
-    """Return the target with the proposal that suits a posterior which is far from normal, the cheapest first."""
-    posterior, optimum = target.posterior, target.optimum
-    simple, linear = LogCholeskyParameterisation(posterior), LinearParameterisation(posterior)
-    if not (target.trusted or posterior.flat_prior):
-        nearly_prior = adapted_proposal(simple, about_prior(posterior), rng.spawn(1)[0], FEW)
-        if nearly_prior is not None:
-            return SamplingTarget(posterior, optimum, simple, nearly_prior, True)
-    collapsed = collapsed_proposal(posterior, optimum, rng, effective_samples)
-    if collapsed is not None and effective_share(linear, collapsed, rng) >= WORTHLESS:
-        return SamplingTarget(posterior, optimum, linear, collapsed, True)
-    if target.trusted:
-        return target
-    adapted = adapted_proposal(simple, simple.proposal(optimum), rng)
-    return target if adapted is None else SamplingTarget(posterior, optimum, simple, adapted, True)

@@ -110,8 +110,9 @@ def smooth_joints(
     """
     starts = [None] * len(samples) if starts is None else starts
     joints = [smooth(series, start) for series, start in zip(samples, starts, strict=True)]
-    joints = _with_all_jumps(joints, STRONG)
-    return tuple(_with_all_jumps([roughened(joint) for joint in joints], LEVEL))
+    moving = _with_all_jumps([joint for joint in joints if not joint.is_constant], STRONG)
+    moved = iter(_with_all_jumps([roughened(joint) for joint in moving], LEVEL))
+    return tuple(joint if joint.is_constant else next(moved) for joint in joints)
 
 
 def _with_all_jumps(joints: list[SmoothedJoint], level: float) -> list[SmoothedJoint]:

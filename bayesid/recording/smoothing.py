@@ -389,7 +389,11 @@ def smooth(
         if best is None or fit.log_likelihood > best.log_likelihood:
             best = fit
     assert best is not None
-    return best
+    if not best.is_constant:
+        return best
+    still = np.zeros_like(best.states)  # of equal readings rounding would make a motion
+    still[:, 0] = next((one.value[0] for one in samples if one.derivative == 0), start)
+    return replace(best, states=still)
 
 
 def _fit(
