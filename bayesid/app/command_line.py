@@ -23,12 +23,12 @@ from contextlib import ExitStack, contextmanager
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 import bayesid.app
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
+from bayesid._math.divergence import divergence_named
 from bayesid._math.memory import take_large_arrays_singly
 from bayesid.app.compilation_cache import keep_compiled
 
@@ -53,16 +53,6 @@ REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL),
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), CLOSED),
 }
-
-# what numerical libraries say of fits that diverge
-DIVERGED = (
-    *("not positive definite", "returned NaN", "must not contain infs", "index 0 is out of bounds"),
-    *("did not converge", "Singular matrix", "x0` is infeasible", "Residuals are not finite"),
-)
-CONTRADICTED = (
-    "the recordings contradict the simulation so far that no fit of it is finite: see what `bayesid check` says of "
-    "units, axes and joints, and whether the robot's file is that of the robot that was recorded"
-)
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 """Application of typer, to which the commands are added below."""
@@ -113,14 +103,10 @@ def _console() -> Console:
 def _reported() -> Iterator[None]:
     """Turn errors in the user's input, and of the disk, into one message and exit status 2."""
     try:
-        yield
+        with divergence_named():
+            yield
     except InputError as error:
         typer.secho(f"Error: {error}", fg="red", err=True)
-        raise typer.Exit(2) from None
-    except (ValueError, ArithmeticError, IndexError, np.linalg.LinAlgError) as error:
-        if not any(sign in str(error) for sign in DIVERGED):
-            raise
-        typer.secho(f"Error: {CONTRADICTED} ({error}).", fg="red", err=True)
         raise typer.Exit(2) from None
     except OSError as error:
         if error.errno == errno.EPIPE:  # the reader of the output is gone, which click handles

@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.progress import PhaseClock, Progress, silent
+from bayesid._math.divergence import divergence_named
 from bayesid.diagnosis.candidates.cause_kind import candidates
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.verdict import Rest, Status, verdict_sensitivity
@@ -40,6 +41,7 @@ __all__ = ["diagnose", "identify_extended"]
 
 
 @threadpool_limits.wrap(limits=1)  # thousands of small factorisations: threads only get in each other's way
+@divergence_named()
 def diagnose(
     model: Model,
     manoeuvres: Sequence[Manoeuvre],
@@ -82,7 +84,7 @@ def diagnose(
     ------
     InputError
         If the numbers of a recording cannot be in the units of the format, or another convention is wrong
-        (`ConventionError`).
+        (`ConventionError`); or if no fit of the present simulation is finite (`DivergenceError`).
     """
     refuse_conventions(model, manoeuvres)
     rng, clock = np.random.default_rng(seed), PhaseClock()

@@ -17,6 +17,7 @@ from bayesid._io.progress import Progress, silent
 from bayesid._io.short_form import ShortForm, Summary, format_spread
 from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
+from bayesid._math.divergence import divergence_named
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.on_device import on_device
 from bayesid.inference.adapted_proposal import adapted_proposal, effective_share
@@ -35,6 +36,7 @@ from bayesid.inference.collapsed_proposal import collapsed_proposal
 from bayesid.inference.ensemble import Chains
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
+from bayesid.inference.no_motion import refuse_no_motion
 from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import identified_robot
@@ -402,6 +404,7 @@ def prior_range(effect: Effect) -> tuple[list[float], list[float]]:
     return low.tolist(), high.tolist()
 
 
+@divergence_named()
 def identify(
     posterior: Posterior,
     seed: int = 0,
@@ -430,10 +433,12 @@ def identify(
     Raises
     ------
     InputError
-        If no value of the unknowns comes near the data, or the sampler does not return draws of the posterior.
+        If nothing moves, no value of the unknowns comes near the data, or the sampler does not return draws of the
+        posterior; `DivergenceError` where no fit is finite.
     """
     if sampler is not None and file is not None:
         raise InputError("a sampler and a file of emcee are given", remedy="Give sampler=Emcee(file=...) alone")
+    refuse_no_motion(posterior)
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     if not optimum.chi2 < HOPELESS * refined.samples:
