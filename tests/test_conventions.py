@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import tomllib
 from pathlib import Path
@@ -10,14 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesid import InputError, Recording
+from bayesid import InputError, Recording, identify
+from bayesid._math.divergence import DivergenceError, divergence_named
 from bayesid.app.convention_remedies import conventions_of, fixed_study, with_remedies
 from bayesid.app.diagnose_command import diagnose_study
 from bayesid.app.schema import Study
+from bayesid.app.study_to_conventions import imported_as
 from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
+from bayesid.inference.no_motion import refuse_no_motion
 from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.recorded_as import JointRecordedAs, RecordedAs, SensorRecordedAs
-from studies.conventions.mistakes import MISTAKES
+from studies.conventions.mistakes import MISTAKES, Columns, edited
 from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.recordings import Sensors
@@ -98,6 +102,24 @@ def test_late_stamps_and_repeated_readings_are_put_right() -> None:
     assert present.sum() == 9  # the first would be before time 0
 
 
+def test_joints_that_are_late_or_early_leave_out_what_the_base_reads_without_them() -> None:
+    columns = {"time": TIME, "position.a": 1.0 + TIME, "position.b": TIME, "rate.x": TIME, "base_force.x": TIME}
+    sensors = {"rate": SensorRecordedAs(), "position": SensorRecordedAs(latency=-0.2)}
+    early = RecordedAs(sensors=sensors).converted(columns)
+    np.testing.assert_allclose(early["time"][-3:], [1.9, 2.0, 2.1])
+    at = np.searchsorted(early["time"], [0.0, 0.45])
+    np.testing.assert_allclose(early["position.a"][at], [1.0, 1.3])  # at rest until its first reading
+    np.testing.assert_array_equal(np.isfinite(early["rate.x"]), (early["time"] > 0.15) & (early["time"] < 1.95))
+    late = RecordedAs(sensors={"rate": SensorRecordedAs()}, joints={"a": JointRecordedAs(latency=0.5)}).converted(
+        columns
+    )
+    present = np.isfinite(late["position.a"])
+    np.testing.assert_allclose(late["position.a"][present], 1.5 + late["time"][present])
+    np.testing.assert_allclose(late["time"][np.isfinite(late["rate.x"])].max(), 1.4)
+    np.testing.assert_array_equal(np.isfinite(late["base_force.x"]), True)
+    np.testing.assert_array_equal(late["position.b"], TIME)
+
+
 def test_gravity_in_space_is_taken_off_a_base_that_turns() -> None:
     turn = 0.3 * TIME
     gravity = 9.8 * np.stack([np.sin(turn), np.cos(turn), 0.0 * turn])
@@ -121,8 +143,72 @@ def test_remedies_replace_keys_and_add_sections() -> None:
     content = tomllib.loads(with_remedies(text, remedies))
     assert content["sensors"]["rate"] == {"sigma": 1, "mounting": [1, 0, 0, 0], "reflected": True}
     assert content["joints"] == {"j": {"sign": -1}}
+    text = "[[recordings]]\nattitude = [1, 0, 0, 0]\n[[recordings]]\nattitude = [0, 1, 0, 0]\n"
+    remedy = "[[recordings]]\nattitude = [0, 0, 0, 1]\n[[recordings]]\nattitude = [0, 0, 1, 0]"
+    attitudes = [section["attitude"] for section in tomllib.loads(with_remedies(text, [remedy]))["recordings"]]
+    assert attitudes == [[0, 0, 0, 1], [0, 0, 1, 0]]
     with pytest.raises(InputError, match="no section"):
         with_remedies("", ["sign = 1"])
+
+
+def test_numbers_that_diverge_are_one_error_with_a_remedy_and_others_stay_as_they_are() -> None:
+    for error in (np.linalg.LinAlgError("Matrix is not positive definite"), ValueError("Probability returned NaN")):
+        with pytest.raises(DivergenceError, match=r"contradict the simulation .*bayesid check"), divergence_named():
+            raise error
+    with pytest.raises(ValueError, match="shapes") as caught, divergence_named():
+        raise ValueError("shapes do not match")
+    assert not isinstance(caught.value, InputError)
+
+
+@pytest.mark.parametrize(
+    ("remedy", "message"),
+    [
+        ("joints.joint9.sign=-1", "no joint 'joint9'"),
+        ("joint1.sign=-1", "there is no joint1"),
+        ("sensors.rate.unit=furlong", "Give 'rad/s'"),
+        ("sensors.rate.mounting=[1, 0, 0, 0]", "State it in the study"),
+        ("sensors=3", "names no key"),
+    ],
+)
+def test_an_import_takes_remedies_by_the_keys_of_a_study(remedy: str, message: str) -> None:
+    given = ["joints.joint1.sign=-1", "sensors.rate.unit=deg/s"]
+    columns = {"time": TIME, "position.joint1": TIME, "rate.x": np.rad2deg(TIME)}
+    converted = imported_as(given, ["joint1"]).converted(columns)
+    np.testing.assert_allclose([converted["position.joint1"], converted["rate.x"]], [-TIME, TIME])
+    with pytest.raises(InputError, match=re.escape(message)):
+        imported_as([remedy], ["joint1"])
+
+
+@pytest.mark.slow
+def test_recordings_without_motion_are_refused_and_those_with_a_little_are_not(study: Path, tmp_path: Path) -> None:
+    file = shutil.copytree(study.parent, tmp_path / "study") / study.name
+    text = file.read_text()
+    file.write_text(text[: text.index("[sensors.attitude]")] + text[text.index("[sensors.encoder]") :])
+    refuse_no_motion(load_posterior(Study.load(file), window=0))
+    draw = np.random.default_rng(1)
+
+    def stilled(columns: Columns) -> Columns:
+        return {
+            name: values if name == "time" else 1e-5 * draw.standard_normal(len(values))
+            for name, values in columns.items()
+        }
+
+    edited(stilled)(file)
+    with pytest.raises(InputError, match="nothing is learnt"):
+        identify(load_posterior(Study.load(file), window=0))
+
+
+@pytest.mark.slow
+def test_the_stated_attitudes_of_all_recordings_are_put_right(tmp_path: Path) -> None:
+    options = {"manoeuvres": Manoeuvres(count=3, duration=40.0), "sensors": Sensors(attitude_period=2.0)}
+    file = write_study(tmp_path, SERVICER3, np.random.default_rng(5), **options).file
+    right = tomllib.loads(file.read_text())["recordings"]
+    swapped = [f"[[recordings]]\nattitude = {list(np.roll(section['attitude'], 1))}" for section in right]
+    file.write_text(with_remedies(file.read_text(), ["\n".join(swapped)]))
+    (convention,) = conventions_of(Study.load(file))
+    assert (convention.name, convention.channel) == ("convention:order:attitude", "recordings.attitude")
+    again = tomllib.loads(with_remedies(file.read_text(), [convention.remedy]))["recordings"]
+    np.testing.assert_allclose([one["attitude"] for one in again], [one["attitude"] for one in right], atol=1e-9)
 
 
 @pytest.mark.slow

@@ -63,6 +63,17 @@ def run(*arguments: object) -> tuple[int, str]:
     return result.exit_code, re.sub(r"\s+", " ", result.output)
 
 
+def test_what_was_recorded_otherwise_is_converted(flown, writer, tmp_path):
+    bag, output = writer.write(tmp_path, "mcap"), tmp_path / "out"
+    remedies = ("--recorded", "joints.joint2.sign=-1", "--recorded", "sensors.accel.unit=g")
+    status, said = run(bag, *TOPICS, *remedies, "--output", output)
+    assert status == 0, said
+    read, content = Recording.read(output / "flight.csv"), json.loads((output / "flight.import.json").read_text())
+    assert content["recorded"] == [*remedies[1::2]]
+    for column, factor in {"position.joint2": -1.0, "position.joint1": 1.0, "accel.x": 9.80665}.items():
+        np.testing.assert_allclose(read.series(column)[1], factor * flown.series(column)[1], rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("kind", "attitude"),
     [

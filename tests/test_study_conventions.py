@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.inference.conventions import find_conventions
 from studies.common.study import Verdict
 from studies.conventions import STUDY
 from studies.conventions.mistakes import MISTAKES
+from studies.conventions.right_studies import UNUSUAL, circumstances
 from studies.conventions.trials import Outcome, tasks, trial
 from studies.truth.hidden_causes import CASES
 
@@ -21,7 +26,7 @@ QUIET = Outcome("leak", False, "servicer3", 0.6, 1e-5, (), (), True, 0.1)
 def test_every_mistake_and_every_cause_is_tried() -> None:
     planned = tasks(full=False)
     assert {task["mistake"] for task in planned if "mistake" in task} == set(MISTAKES)
-    assert {task["case"] for task in planned if "case" in task} == {case.name for case in CASES}
+    assert {task["case"] for task in planned if "case" in task} == {case.name for case in CASES} | set(UNUSUAL)
     assert len(tasks(full=True)) > 20 * len(planned)
 
 
@@ -31,7 +36,7 @@ def verdicts(outcomes: Sequence[Outcome]) -> list[Verdict]:
 
 def test_goals_follow_from_the_outcomes() -> None:
     assert verdicts([NAMED] * 4000 + [QUIET] * 9000) == [Verdict.PASS] * 3
-    alarmed = replace(QUIET, said=("convention:sign:j",), seconds=9.0)
+    alarmed = replace(QUIET, said=("convention:sign:j",), alarms=1, seconds=9.0)
     assert verdicts([NAMED] * 4000 + [QUIET] * 900 + [alarmed] * 100)[0] == Verdict.FAIL
     unmended = replace(NAMED, mended=False)
     assert verdicts([NAMED] * 400 + [unmended] * 100 + [QUIET, alarmed])[1:] == [Verdict.FAIL, Verdict.FAIL]
@@ -41,4 +46,14 @@ def test_goals_follow_from_the_outcomes() -> None:
 @pytest.mark.parametrize("number", [0, len(CASES) // 2])
 def test_a_right_study_with_a_strong_cause_is_left_in_peace(number: int) -> None:
     made = trial(tasks(full=False)[number], np.random.default_rng(0))
-    assert made["said"] == ()
+    assert (made["said"], made["alarms"], made["looks"]) == ((), 0, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNUSUAL)
+def test_a_right_study_of_an_unusual_robot_is_left_in_peace_in_all_circumstances(name: str, tmp_path: Path) -> None:
+    study = Study.load(UNUSUAL[name](tmp_path, 7))
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    for changed, recorded in circumstances(model, manoeuvres, np.random.default_rng(8), 6):
+        assert find_conventions(changed, recorded) == []

@@ -15,12 +15,12 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.conventions import find_conventions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.wrong_units import refuse_wrong_units
-from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.convention import Convention, ConventionError, in_one_line
 
 __all__ = ["conventions_of", "fixed_study", "with_remedies"]
 
 ROUNDS = 4  # largest number of times that a study is put right: a unit of time hides all other mistakes
-LIKELY = 0.5  # probability from which a remedy is offered
+LIKELY = 0.5  # probability above which a remedy is offered: of two that exclude each other only one has it
 
 
 def conventions_of(study: Study) -> list[Convention]:
@@ -60,13 +60,11 @@ def fixed_study(file: Path, agrees: Callable[[str], bool]) -> Iterator[str]:
     """
     for _ in range(ROUNDS):
         conventions = conventions_of(Study.load(file))
-        offered = [convention for convention in conventions if convention.probability >= LIKELY]
+        offered = [convention for convention in conventions if convention.probability > LIKELY]
         yield from convention_lines(conventions)
         if conventions and not offered:
             yield "These cannot be told apart: choose one, and write it into the study."
-        accepted = [
-            offer for offer in offered if agrees(f"Write into {file.name}: {'; '.join(offer.remedy.splitlines())}?")
-        ]
+        accepted = [offer for offer in offered if agrees(f"Write into {file.name}: {in_one_line(offer.remedy)}?")]
         if not accepted:
             yield f"{file}: {'nothing was written' if conventions else 'no convention is wrong'}."
             return
@@ -76,10 +74,6 @@ def fixed_study(file: Path, agrees: Callable[[str], bool]) -> Iterator[str]:
         yield f"Wrote {len(accepted)} of {len(conventions)} remedies into {file}."
 
 
-def _question(file: Path, convention: Convention) -> str:
-    return f"Write into {file.name}: {'; '.join(convention.remedy.splitlines())}?"
-
-
 def with_remedies(text: str, remedies: Sequence[str]) -> str:
     """Return the text of a study with lines of other keys, which replace those that stand there.
 
@@ -87,31 +81,40 @@ def with_remedies(text: str, remedies: Sequence[str]) -> str:
     ----------
     text : str
     remedies : sequence of str
-        Each a header in brackets with its keys, or several of them.
+        Each a header in brackets with its keys, or several of them: the n-th of one header in double brackets means
+        the n-th such section of the study.
     """
     lines = text.splitlines()
-    header = ""
-    for line in (line for remedy in remedies for line in remedy.splitlines()):
-        if line.startswith("["):
-            header = line
-            if _place(lines, header) is None:
-                lines += ["", header]
-            continue
-        key = line.partition("=")[0].strip()
-        start = _place(lines, header)
-        if start is None:
-            raise InputError(f"the study has no section {header}", remedy=f"Write it: {line}")
-        end = next((i for i in range(start + 1, len(lines)) if lines[i].lstrip().startswith("[")), len(lines))
-        same = [i for i in range(start + 1, end) if re.match(rf"\s*{re.escape(key)}\s*=", lines[i])]
-        if same:
-            lines[same[0]] = line
-        else:
-            lines.insert(start + 1, line)
+    for remedy in remedies:
+        headers: list[str] = []
+        for line in remedy.splitlines():
+            if line.startswith("["):
+                headers.append(line)
+            else:
+                _write(lines, headers, line)
     return "\n".join([*lines, ""])
 
 
-def _place(lines: Sequence[str], header: str) -> int | None:
-    """Return the number of the line with a header, however its name is quoted."""
+def _write(lines: list[str], headers: Sequence[str], line: str) -> None:
+    """Write a line with a key into the section of the last of the headers."""
+    if not headers:
+        raise InputError(f"the remedy {line} is in no section", remedy="Write the section's header before it")
+    header, key = headers[-1], line.partition("=")[0].strip()
+    number = headers.count(header) - 1 if header.startswith("[[") else 0
+    if _place(lines, header, number) is None:
+        lines += ["", header]
+    start = _place(lines, header, number)
+    assert start is not None
+    end = next((i for i in range(start + 1, len(lines)) if lines[i].lstrip().startswith("[")), len(lines))
+    same = [i for i in range(start + 1, end) if re.match(rf"\s*{re.escape(key)}\s*=", lines[i])]
+    if same:
+        lines[same[0]] = line
+    else:
+        lines.insert(start + 1, line)
+
+
+def _place(lines: Sequence[str], header: str, number: int = 0) -> int | None:
+    """Return the number of the line with the n-th such header, however its name is quoted."""
     plain = header.replace('"', "").strip()
-    same = (i for i, line in enumerate(lines) if line.partition("#")[0].replace('"', "").strip() == plain)
-    return next(same, None)
+    same = [i for i, line in enumerate(lines) if line.partition("#")[0].replace('"', "").strip() == plain]
+    return same[number] if number < len(same) else None

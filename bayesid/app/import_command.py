@@ -55,11 +55,22 @@ def run(
     most_faulty: Annotated[
         float, typer.Option(metavar="FRACTION", help="Largest share of a topic's messages to leave out as faulty.")
     ] = 0.02,
+    recorded: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUE",
+            help="What was recorded otherwise than the format has it, by a key of a study, such as "
+            "joints.elbow.sign=-1 or sensors.rate.unit=deg/s; it is converted; repeatable.",
+        ),
+    ] = None,
 ) -> Iterator[str]:
     """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_to_conventions import imported_as
     from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag
     from bayesid.recording.ros_bag import format_stamp
+
+    conventions = tuple(recorded or ())
 
     window = TimeWindow.of_options(start, end, duration)
     selected = BagTopics(
@@ -73,9 +84,12 @@ def run(
         window,
         most_faulty,
         tuple(wheels or ()),
+        any(key.startswith("sensors.accel.gravity") for key in conventions),
     )
     imported = import_bag(bag, selected)
     recording = imported.recording
+    if conventions:
+        recording = recording.converted(imported_as(conventions, recording.joints))
     file = output / f"{recording.name}.csv"
     with complete_folder(output) as folder:
         recording.write(folder / file.name)
@@ -86,6 +100,7 @@ def run(
             "stamp_of_time_0_ns": imported.start,
             "duration": float(recording.time[-1]),
             "joints": list(recording.joints),
+            "recorded": list(conventions),
             "topics": [{**asdict(topic), "meaning": _meaning(topic)} for topic in imported.topics],
         }
         write_json(folder / f"{recording.name}.import.json", content)

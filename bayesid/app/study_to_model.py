@@ -24,7 +24,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.convention import ConventionError
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
+from bayesid.recording.plausibility import refuse_impossible_joints, unwrapped
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
 from bayesid.recording.wheel_motion import check_wheels
 from bayesid.robot.body_prior import BodyPrior, Mixing
@@ -244,7 +244,7 @@ def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Ma
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = unwrapped(Recording.read(section.file, recorded_as(study, section, robot)), robot)
     check_wheels(recording, robot.wheels)
-    refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
+    refuse_impossible_joints(recording, robot)  # before they are smoothed; what the base reads is weighed first
     for name in section.start:
         number = study.recordings.index(section) + 1
         named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)

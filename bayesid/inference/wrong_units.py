@@ -26,7 +26,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
-from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.convention import Convention, ConventionError, in_one_line
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
@@ -181,14 +181,21 @@ def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
 
 
 def _nearest_unit(seen: _Comparison) -> list[Convention]:
-    """Return the convention that readings are in the unit that is nearest to their factor, if one is near."""
+    """Return the convention that readings are in the unit that is nearest to their factor, or in one of their own."""
     family = "" if seen.kind is None else seen.kind.value
     off = {
         unit: abs(np.log(abs(seen.factor) * factor)) for unit, factor in UNITS.get(family, {}).items() if factor != 1.0
     }
     unit = min(off, key=lambda name: off[name], default="")
-    if not unit or off[unit] > np.log(NEAR):
+    if not family:
         return []
+    if not unit or off[unit] > np.log(NEAR):
+        line = f"[sensors.{family}]\nscale = {1.0 / abs(seen.factor):.3g}"
+        text = (
+            f"The readings of {family} are in no usual unit, as counts are. The factor is estimated with the robot as "
+            "given: take it from the data sheet."
+        )
+        return [Convention(f"convention:unit:{family}", family, line, text)]
     line, text = f'[sensors.{family}]\nunit = "{unit}"', f"The readings of {family} are in {unit}."
     return [Convention(f"convention:unit:{family}", family, line, text)]
 
@@ -228,7 +235,7 @@ def _refuse_times(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
             f"the readings follow the joints' motion only if times are {name}",
             file=recording.file or recording.name,
             place="column time",
-            remedy=f"Give times in seconds, or state it: {'; '.join(line.splitlines())}",
+            remedy=f"Give times in seconds, or state it: {in_one_line(line)}",
         )
 
 
@@ -260,7 +267,7 @@ def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Compari
             file=recording.file or recording.name,
             place=f"column {small[0].column}",
             remedy="Give them in m/s2, or correct the accelerometer's position, which then is ten times too far; or "
-            f"state it: {'; '.join(line.splitlines())}",
+            f"state it: {in_one_line(line)}",
         )
 
 

@@ -177,7 +177,7 @@ def wheel_channels(topic: StampedTopic, names: Sequence[str]) -> Channels:
     }
 
 
-def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
+def imu_channels(topic: StampedTopic, *, accel: bool, gravity: bool = False) -> Channels:
     """Return angular velocity and, if wanted, acceleration of an IMU, unless it says that it does not measure them.
 
     Parameters
@@ -185,6 +185,8 @@ def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
     topic : StampedTopic
     accel : bool
         Whether the acceleration is wanted.
+    gravity : bool
+        Whether it is known to hold gravity.
 
     Raises
     ------
@@ -197,7 +199,8 @@ def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
         channels |= _vector(topic, "angular_velocity", "rate")
     if accel and first.linear_acceleration_covariance[0] != NOT_MEASURED:
         channels |= _vector(topic, "linear_acceleration", "accel")
-        _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"][1] for axis in "xyz"], axis=1))
+        if not gravity:
+            _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"][1] for axis in "xyz"], axis=1))
     if not channels:
         problem = "its covariances say that it measures neither angular velocity nor acceleration"
         raise topic.error(problem, remedy="Name the topic of an IMU that does")

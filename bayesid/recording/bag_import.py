@@ -142,6 +142,8 @@ class BagTopics:
         Largest share of a topic's messages that may be left out as faulty.
     wheels : sequence of str
         Topics of the wheels' speeds, each as ``TOPIC`` or ``NAME,NAME=TOPIC``.
+    gravity : bool
+        Whether the accelerations are known to hold gravity, and so are not refused for it.
     """
 
     joints: Sequence[str]
@@ -154,6 +156,7 @@ class BagTopics:
     window: TimeWindow = field(default_factory=TimeWindow)
     most_faulty: float = MOST_FAULTY
     wheels: Sequence[str] = ()
+    gravity: bool = False
 
     @property
     def named_wheels(self) -> dict[str, tuple[str, ...]]:
@@ -243,7 +246,9 @@ def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
     known = max(int(stamps[0]) for stamps in joints), min(int(stamps[-1]) for stamps in joints)
     base: list[tuple[StampedTopic, Callable[[StampedTopic], Channels]]] = []
     if selected.imu is not None:
-        base.append((sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel)))
+        base.append(
+            (sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel, gravity=selected.gravity))
+        )
     if selected.attitude is not None:
         base.append((sound(selected.attitude, attitude_fault), attitude_channels))
     moving = [*arms, *(topic for topic, _ in spun)]

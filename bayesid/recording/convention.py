@@ -12,7 +12,9 @@ from typing import Any
 
 from bayesid._io.errors import InputError
 
-__all__ = ["Convention", "ConventionError"]
+__all__ = ["Convention", "ConventionError", "in_one_line"]
+
+HEADER_END = "\0"  # marks headers, which values in brackets may resemble
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,16 @@ class Convention:
         return asdict(self)
 
     def __str__(self) -> str:
-        lines = "; ".join(line for line in self.remedy.splitlines() if line)
-        return f"{self.text} In the study: {lines}" if lines else self.text
+        return f"{self.text} In the study: {in_one_line(self.remedy)}" if self.remedy else self.text
+
+
+def in_one_line(remedy: str) -> str:
+    """Return the lines of a remedy as ``[section] key = value; key = value``."""
+    text = ""
+    for line in filter(None, remedy.splitlines()):
+        between = "" if not text else " " if text.endswith(HEADER_END) or line.startswith("[") else "; "
+        text += f"{between}{line}{HEADER_END if line.startswith('[') else ''}"
+    return text.replace(HEADER_END, "")
 
 
 class ConventionError(InputError):

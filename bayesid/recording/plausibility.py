@@ -14,7 +14,7 @@ from bayesid.recording.recording import Recording
 from bayesid.recording.units import ANGLES, UNITS
 from bayesid.robot.robot import Joint, Robot
 
-__all__ = ["refuse_impossible_motion", "unwrapped"]
+__all__ = ["refuse_impossible_joints", "refuse_impossible_motion", "unwrapped"]
 
 FASTEST = 5.0  # speed of a joint relative to its limit that none reaches
 READING_ERROR = 0.01  # largest change of a reading by the noise and the steps of a coarse encoder [rad or m]
@@ -23,6 +23,8 @@ FASTEST_BASE = 20.0  # angular speed of the base that no free-flying robot keeps
 TURN = 2.0 * np.pi  # by which an angle jumps where its reading begins anew [rad]
 NEAR_TURN = 0.5  # difference from a turn by which a joint may move from one sample to the next beside the jump [rad]
 GARBLED = 0.01  # share of the samples up to which those outside the limits are garbled, not in another unit
+OFTEN = 3  # number of times that one value outside the limits comes and goes where it is filled in
+LONELY = 0.8  # probability that one joint alone is in degrees where all others stay within a turn of them
 MOST_DEGREES = 1000.0  # largest angle that is taken for degrees where arcseconds would be within the limits too
 RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the base
 
@@ -41,7 +43,7 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
         If a position is beyond a limit by more than a tenth of the range, a speed is above five times its limit, or
         most rates of the base are above 20 rad/s.
     """
-    _refuse_joints(recording, robot)
+    refuse_impossible_joints(recording, robot)
     for name in RATE:
         readings = recording.series(name)[1] if name in recording.channels else np.zeros(0)
         if readings.size:
@@ -104,7 +106,19 @@ def unwrapped(recording: Recording, robot: Robot) -> Recording:
     return replace(recording, channels={**recording.channels, **channels}) if channels else recording
 
 
-def _refuse_joints(recording: Recording, robot: Robot) -> None:
+def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
+    """Refuse joints far outside their limits or faster than they can be.
+
+    Parameters
+    ----------
+    recording : Recording
+    robot : Robot
+
+    Raises
+    ------
+    InputError
+        As `refuse_impossible_motion`, of the joints alone.
+    """
     file = recording.file or recording.name
     for joint in robot.joints:
         name = f"position.{joint.name}"
@@ -120,7 +134,9 @@ def _refuse_joints(recording: Recording, robot: Robot) -> None:
         )
         if outside.any():
             row, count = int(np.argmax(outside)), int(outside.sum())
-            garbled = count <= GARBLED * len(outside)
+            runs = int(np.sum(np.diff(outside.astype(int)) == 1))
+            filled = len(set(position[outside].tolist())) == 1 and runs >= OFTEN
+            garbled = filled or count <= GARBLED * len(outside)
             conventions = _fill(name, position[outside]) if garbled else _other_conventions(recording, robot, joint)
             remedy = f"{count} of {len(outside)} samples are garbled: empty their cells" if garbled else other
             raise ConventionError(
@@ -184,13 +200,30 @@ def _other_conventions(recording: Recording, robot: Robot, joint: Joint) -> list
         largest = max(float(np.abs(seen(other)).max()) for other in turns)
         if "deg" in units and largest < MOST_DEGREES:
             units = ["deg"]
+        elif largest > TURN and all((seen(other) % 1.0 == 0.0).all() for other in turns):
+            units = []
+            text = "The joints are in counts: give 6.28319 over the counts of a turn."
+            line = f"[sensors.encoder]\nscale = {TURN / _counts_of_turn(largest):.6g}"
+            conventions.append(Convention("convention:unit:position", "position", line, text))
         for unit in units if largest > TURN else ():
             line, text = f'[sensors.encoder]\nunit = "{unit}"', f"The joints are in {unit}, not in rad."
             conventions.append(Convention("convention:unit:position", "position", line, text))
     elif within(1e-3 * position):
         text = f"Joint {joint.name} is in mm, not in m."
         conventions.append(Convention(f"convention:unit:{joint.name}", joint.name, f"{quoted}\nscale = 0.001", text))
-    return [replace(convention, probability=1.0 / len(conventions)) for convention in conventions]
+    share = 1.0 / len(conventions) if conventions else 0.0
+    conventions = [replace(convention, probability=share) for convention in conventions]
+    others = [float(np.abs(seen(other)).max()) for other in robot.joints if other.unit == "rad" and other != joint]
+    if joint.unit == "rad" and others and max(others) < TURN and within(ANGLES["deg"] * position):
+        line, text = f"{quoted}\nscale = {ANGLES['deg']:.9g}", f"Joint {joint.name} is in degrees, the others are not."
+        alone = Convention(f"convention:unit:{joint.name}", joint.name, line, text, LONELY)
+        conventions = [alone, *(replace(other, probability=(1.0 - LONELY) * share) for other in conventions)]
+    return conventions
+
+
+def _counts_of_turn(largest: float) -> float:
+    """Return the smallest power of two that is a turn where no reading is larger than half of one."""
+    return float(2.0 ** np.ceil(np.log2(2.0 * largest)))
 
 
 def _impossible_speed(time: Floats, position: Floats, limit: float) -> tuple[float, float] | None:

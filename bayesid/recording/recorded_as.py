@@ -8,7 +8,7 @@ at a higher rate, and stamps that are late.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,12 +35,15 @@ class JointRecordedAs:
         Offset in rad or m.
     column : str
         Joint whose columns hold its readings; empty for its own.
+    latency : float
+        Time by which its stamps are late [s].
     """
 
     sign: float = 1.0
     offset: float = 0.0
     scale: float = 1.0
     column: str = ""
+    latency: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,36 @@ class RecordedAs:
     start: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     orbit_rate: float = 0.0
 
+    def joint(self, name: str) -> JointRecordedAs:
+        """Return the convention of one joint."""
+        return self.joints.get(name, JointRecordedAs())
+
+    def sensor(self, family: str) -> SensorRecordedAs:
+        """Return the convention of one family."""
+        return self.sensors.get(family, SensorRecordedAs())
+
+    def with_sensor(self, family: str, convention: SensorRecordedAs) -> RecordedAs:
+        """Return the conventions with another one of a family."""
+        return replace(self, sensors={**self.sensors, family: convention})
+
+    def later(self, channel: str, latency: float) -> RecordedAs:
+        """Return the conventions with stamps that are later still.
+
+        Parameters
+        ----------
+        channel : str
+            A family, or ``position.JOINT``.
+        latency : float
+            [s]
+        """
+        family, _, joint = channel.partition(".")
+        stated = self.sensor(family)
+        if not joint:
+            return self.with_sensor(family, replace(stated, latency=stated.latency + latency))
+        before = self.joint(joint)
+        changed = replace(before, latency=(before.latency or stated.latency) + latency)
+        return replace(self, joints={**self.joints, joint: changed})
+
     def converted(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Return columns as the format has them.
 
@@ -130,11 +163,15 @@ class RecordedAs:
         self._take_gravity(columns)
         self._turn_attitudes(columns)
         columns = self._joints(columns)
+        base = tuple(family for family in self.sensors if family != "position")
+        late = {joint: convention.latency for joint, convention in self.joints.items() if convention.latency}
+        for joint, latency in late.items():
+            columns = _earlier(columns, [f"{family}.{joint}" for family in MOVED], latency, base)
         for family, convention in self.sensors.items():
             if convention.latency:
-                columns = _earlier(
-                    columns, [n for names in _groups(columns, family) for n in names], convention.latency
-                )
+                names = [name for group in _groups(columns, family) for name in group]
+                names = [name for name in names if name.partition(".")[2] not in late]
+                columns = _earlier(columns, names, convention.latency, base)
         return columns
 
     def _joints(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -251,9 +288,17 @@ def _thin(columns: dict[str, Floats], names: Sequence[str], convention: SensorRe
             columns[name] = np.where(gone, np.nan, columns[name])
 
 
-def _earlier(columns: Mapping[str, Floats], names: Sequence[str], latency: float) -> dict[str, Floats]:
-    """Return columns with the readings of some of them at earlier times; rows are added where there are none."""
-    time = columns["time"]
+def _earlier(
+    columns: Mapping[str, Floats], names: Sequence[str], latency: float, base: Sequence[str]
+) -> dict[str, Floats]:
+    """Return columns with the readings of some of them at other times; rows are added where there are none.
+
+    Where they are of joints, what the sensors of the base read before the first or after the last of them is left out,
+    and the joints are taken to rest until their first.
+    """
+    time, names = columns["time"], [name for name in names if name in columns]
+    if not names:
+        return dict(columns)
     moved = time - latency
     nearest = np.searchsorted(time, moved)
     step = float(np.median(np.diff(time)))
@@ -268,4 +313,11 @@ def _earlier(columns: Mapping[str, Floats], names: Sequence[str], latency: float
             result[name] = np.full(len(whole), np.nan)
             rows = np.searchsorted(whole, moved[present] if name in names else time)
             result[name][rows] = values[present] if name in names else values
+    if names[0].partition(".")[0] in MOVED:
+        inside = (whole >= moved[present][0]) & (whole <= moved[present][-1])
+        for name, values in result.items():
+            if name in names and not inside[0]:
+                values[0] = values[inside][np.isfinite(values[inside])][0] if name.startswith("position.") else 0.0
+            elif name.partition(".")[0] in base:
+                values[~inside] = np.nan
     return result

@@ -11,7 +11,7 @@ import csv
 import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -53,6 +53,8 @@ class Recording:
     channels : mapping of str to (T,) array_like
         Samples by the name of their column, NaN where a channel has no sample. Arrays are copied and locked
         read-only; attitude quaternions are normalised.
+    recorded_as : RecordedAs, optional
+        Conventions from which they were converted, by default those of the format.
 
     Raises
     ------
@@ -64,6 +66,7 @@ class Recording:
     file: Path | None
     time: Array
     channels: Mapping[str, Array]
+    recorded_as: RecordedAs = field(default_factory=RecordedAs)
 
     def __post_init__(self) -> None:
         channels = {column: np.array(values, dtype=float) for column, values in self.channels.items()}
@@ -77,9 +80,9 @@ class Recording:
         for values in channels.values():
             values.setflags(write=False)
 
-    def __reduce__(self) -> tuple[type[Recording], tuple[str, Path | None, Array, dict[str, Array]]]:
+    def __reduce__(self) -> tuple[type[Recording], tuple[str, Path | None, Array, dict[str, Array], RecordedAs]]:
         # a mapping proxy does not pickle, and unpickled arrays would be writable
-        return Recording, (self.name, self.file, self.time, dict(self.channels))
+        return Recording, (self.name, self.file, self.time, dict(self.channels), self.recorded_as)
 
     @classmethod
     def read(cls, path: str | Path, recorded_as: RecordedAs | None = None) -> Recording:
@@ -105,7 +108,12 @@ class Recording:
         columns = reader(file)
         if recorded_as is not None:
             columns = recorded_as.converted(columns)
-        return cls(file.stem, file, columns.pop("time"), columns)
+        return cls(file.stem, file, columns.pop("time"), columns, recorded_as or RecordedAs())
+
+    def converted(self, recorded_as: RecordedAs) -> Recording:
+        """Return the recording as the format has it, where it was recorded by other conventions."""
+        columns = recorded_as.converted({"time": self.time, **self.channels})
+        return Recording(self.name, self.file, columns.pop("time"), columns, self.recorded_as)
 
     def write(self, path: str | Path) -> None:
         """Write a ``.csv`` (12 significant digits) or ``.parquet`` (exact) file, whole or not at all."""

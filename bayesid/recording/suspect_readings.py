@@ -162,6 +162,14 @@ def _interpolated(time: Floats, values: Floats) -> float:
 def _scattered_fill(values: Floats, steps: Floats) -> tuple[Integers, tuple[float, ...]] | None:
     """Return the rows of one sample that comes again and again, far from its neighbours, and that sample."""
     jumps = np.minimum(steps[1:], steps[:-1])
+    alone = 1 + np.flatnonzero(jumps > 0.0)
+    if values.shape[1] > 1 and len(alone):  # noise never gives one vector again, unless its steps are coarse
+        vectors, counts = np.unique(values, axis=0, return_counts=True)
+        again = np.flatnonzero(counts > 1)
+        if len(again) == 1 and counts[again[0]] >= AGAIN:
+            rows = np.flatnonzero((values == vectors[again[0]]).all(axis=1))
+            if np.isin(rows, alone).all():
+                return rows, tuple(vectors[again[0]].tolist())
     typical = float(np.median(steps))
     far = 1 + np.flatnonzero(jumps > JUMP * max(typical, 1e-12))
     if len(far) < AGAIN:

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.convention import Convention, ConventionError, in_one_line
 
 __all__ = ["calendar_seconds", "refuse_other_units", "typed_seconds"]
 
@@ -106,5 +106,5 @@ def _in_unit(problem: str, remedy: str, file: Path | str, unit: str) -> InputErr
         return InputError(problem, file=file, place=place, remedy=remedy)
     line = f'[telemetry]\ntime_unit = "{unit}"'
     convention = Convention("convention:unit:time", "time", line, f"{problem[0].upper()}{problem[1:]}.")
-    stated = f"{remedy}, or state it: {'; '.join(line.splitlines())}"
+    stated = f"{remedy}, or state it: {in_one_line(line)}"
     return ConventionError([convention], problem, file=file, place=place, remedy=stated)

@@ -14,7 +14,7 @@ ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3, "arcsec": math.pi / 
 
 UNITS = {
     "rate": {f"{name}/s": factor for name, factor in ANGLES.items()}
-    | {"deg/h": ANGLES["deg"] / 3600.0, "rpm": math.pi / 30.0},
+    | {"mdeg/s": 1e-3 * ANGLES["deg"], "deg/h": ANGLES["deg"] / 3600.0, "rpm": math.pi / 30.0},
     "accel": {
         "m/s2": 1.0,
         "g": STANDARD_GRAVITY,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bayesid.diagnosis.evidence.verdict import Rest, Status
-from bayesid.recording.convention import Convention
+from bayesid.recording.convention import Convention, in_one_line
 from bayesid.report.document import Document
 from bayesid.report.numbers import format_probability
 
@@ -60,13 +60,14 @@ def convention_report(conventions: Sequence[Convention], title: str, file: Path,
     document.section("Wrong conventions")
     document.paragraph(
         "The recordings contradict what the study says of them, and follow the simulation once it is put right. Causes "
-        "in the simulation are not looked for before."
+        "in the simulation are not looked for before. The lines of the table put the study right; `bayesid init --fix` "
+        "writes them."
     )
     document.items([convention.text for convention in conventions])
     document.table(
         ["convention", "probability:", "remedy in the study"],
         [
-            [convention.name, format_probability(convention.probability), "; ".join(convention.remedy.splitlines())]
+            [convention.name, format_probability(convention.probability), in_one_line(convention.remedy)]
             for convention in conventions
         ],
         "Wrong conventions with their remedies. Probabilities weigh them by the balance of momentum against each other "

@@ -113,6 +113,24 @@ def _sparse(family: str, every: int, fill: Callable[[Integers, Array], Array]) -
     return change
 
 
+def _late(prefix: str, samples: int) -> Callable[[Columns], Columns]:
+    """Return the change that moves channels by samples to later stamps, or earlier ones where they are negative."""
+
+    def change(columns: Columns) -> Columns:
+        result = dict(columns)
+        for name, values in columns.items():
+            if name.startswith(prefix):
+                present = np.flatnonzero(np.isfinite(values))
+                use, place = (
+                    (present[:-samples], present[samples:]) if samples > 0 else (present[-samples:], present[:samples])
+                )
+                result[name] = np.full(len(values), np.nan)
+                result[name][place] = values[use]
+        return result
+
+    return change
+
+
 def _filled(family: str, value: float) -> Callable[[Columns], Columns]:
     def change(columns: Columns) -> Columns:
         result = dict(columns)
@@ -163,6 +181,15 @@ MISTAKES: dict[str, Blunder] = {
     "times in nanoseconds since 1970": Blunder(edited(_times("time", 1e9, 1.7e18)), ("convention:unit:time",), 1e-3),
     "rates held": Blunder(edited(_sparse("rate", 4, lambda rows, seen: seen[rows // 4])), ("convention:held:rate",)),
     "rates with fill values": Blunder(edited(_filled("rate", 999.0)), ("convention:fill:rate",)),
+    "rates three samples late": Blunder(edited(_late("rate.", 3)), ("convention:shift:rate",)),
+    "accelerations two samples late": Blunder(edited(_late("accel.", 2)), ("convention:shift:accel",)),
+    "joints two samples early, as commanded": Blunder(
+        edited(_late("position.", -2)),
+        ("convention:shift:position",),
+        0.05,  # they are taken to rest before
+    ),
+    "rates in counts": Blunder(edited(_times("rate.", 9000.0)), ("convention:unit:rate",), 1.0),
+    "accelerations in counts": Blunder(edited(_times("accel.", 3.0e5)), ("convention:unit:accel",), 1.0),
     "a sign and a unit": Blunder(
         edited(_both(_times("position.joint2", -1.0), _times("accel.", 1e3 / GRAVITY))),
         ("convention:unit:accel", "convention:sign:joint2"),

@@ -36,15 +36,21 @@ def _interval(count: int, total: int) -> tuple[float, float]:
     return low, high
 
 
+def _most(count: int, total: int) -> float:
+    """Return the one-sided upper limit of a share at 95 % (Clopper and Pearson 1934)."""
+    return float(beta.ppf(0.95, count + 1, total - count)) if count < total else 1.0
+
+
 def _goals(outcomes: Sequence[Outcome]) -> list[Goal]:
     right, wrong = ([row for row in outcomes if row.wrong == side] for side in (False, True))
-    alarms, named = sum(bool(row.said) for row in right), sum(row.right for row in wrong)
+    alarms, looks = sum(row.alarms for row in right), sum(row.looks for row in right)
+    named = sum(row.right for row in wrong)
     slowest = max(row.seconds for row in outcomes)
     return [
         Goal(
             "Right studies with anything hidden: at most 1 in 1,000 said to have a wrong convention",
-            f"{alarms} of {len(right)}",
-            Verdict.between(*_interval(alarms, len(right)), most=ALARMS),
+            f"{alarms} of {looks}; with 95 % at most {1e3 * _most(alarms, looks):.2g} in 1,000",
+            Verdict.between(*_interval(alarms, looks), most=ALARMS),
         ),
         Goal(
             "Mistakes: 99 % named exactly, and put right by their remedy",
@@ -68,6 +74,10 @@ def _figure(outcomes: Sequence[Outcome]) -> Figure:
     return figure
 
 
+def _kind(outcome: Outcome) -> list[str | float]:
+    return [outcome.subject, outcome.wrong, outcome.robot, outcome.amplitude, outcome.noise]
+
+
 def _missed(document: Document, outcomes: Sequence[Outcome]) -> None:
     document.section("What was missed, and what was said in vain")
     rows = [
@@ -89,7 +99,8 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
         subtitle="Axes, signs, orders and units that telemetry does not state are named",
         question="Are the mistakes that people make with telemetry named, and right studies left in peace?",
         answer=f"Of {len(wrong)} studies with a mistake {sum(row.right for row in wrong)} are put right by what is "
-        f"said; of {len(right)} right studies {sum(bool(row.said) for row in right)} are said to be wrong.",
+        f"said; of {sum(row.looks for row in right)} looks at right studies {sum(row.alarms for row in right)} say "
+        "that they are wrong.",
         valid="Base and arm exchange momentum: no mistake shows where nothing moves, and one in what hardly moves the "
         "base, or about an axis of symmetry, is told from none or from others only as far as the noise permits.",
         goals=_goals(outcomes),
@@ -101,17 +112,16 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
             sensors=f"Rate, acceleration, attitude and encoders; in the full run with noise of {NOISES}.",
             known="All links but the base.",
             unknown="The base, about a guess that is some 10 % wrong.",
-            replicates="Other motions, starts and noise; causes of and outside the catalogue at four strengths.",
+            replicates="Other motions, starts and noise; causes of and outside the catalogue at five strengths; each "
+            "right study with up to ten times the noise, mountings of up to 30 degrees, guesses of the base wrong by "
+            "up to three, and some of its sensors.",
         ),
         sections=[_missed],
         tables=[
             CsvTable(
                 "trials",
-                ["study", "mistake", "robot", "amplitude", "noise", "said", "right", "seconds"],
-                [
-                    [r.subject, r.wrong, r.robot, r.amplitude, r.noise, " ".join(r.said), r.right, f"{r.seconds:.2f}"]
-                    for r in outcomes
-                ],
+                ["study", "mistake", "robot", "amplitude", "noise", "said", "right", "looks", "alarms", "seconds"],
+                [[*_kind(r), " ".join(r.said), r.right, r.looks, r.alarms, f"{r.seconds:.2f}"] for r in outcomes],
             )
         ],
     )
@@ -120,7 +130,7 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
 STUDY = Study(
     name="conventions",
     description="Hide mistakes of telemetry and causes of any kind, and count what is said of conventions.",
-    full="three robots, sizes and noises, and causes of four strengths",
+    full="three robots, sizes and noises, and causes of five strengths",
     extra=TRIALS,
     run=run,
     report=_report,

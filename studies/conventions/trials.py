@@ -17,6 +17,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.conventions import find_conventions
 from studies.common.monte_carlo import Workers, run_trials
 from studies.conventions.mistakes import MISTAKES
+from studies.conventions.right_studies import UNUSUAL, circumstances
 from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4
 from studies.truth.hidden_causes import CASES
 from studies.truth.mujoco import Manoeuvres, write_study
@@ -24,7 +25,8 @@ from studies.truth.recordings import Sensors
 
 ROBOTS: Mapping[str, Path] = {"servicer3": SERVICER3, "servicer4": SERVICER4, "branched": BRANCHED}
 AMPLITUDES, NOISES = (0.2, 0.6, 1.2), (1e-6, 1e-5, 1e-4)  # of the joints [rad], and of all sensors [rad/s, m/s2]
-STRENGTHS = (0.3, 1.0, 5.0, 30.0)  # of what is hidden, relative to what a diagnosis sees well
+LOOKS = 12  # circumstances of each right study
+STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0)  # of what is hidden, relative to what a diagnosis sees well
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Outcome:
     expected: tuple[str, ...]
     mended: bool  # whether no convention is wrong once the remedies are written
     seconds: float
+    looks: int = 1  # number of circumstances in which it was looked at
+    alarms: int = 0  # number of those of a right study in which something was said
 
     @property
     def right(self) -> bool:
@@ -50,13 +54,19 @@ class Outcome:
 def tasks(full: bool) -> list[dict[str, Any]]:
     """Return what is tried: every hidden cause of the catalogue and beyond, and every mistake."""
     repeats = range(6 if full else 1)
-    strengths = STRENGTHS if full else STRENGTHS[1:3]
+    strengths = STRENGTHS if full else STRENGTHS[1::2]
+    looks = LOOKS if full else 3
     right = [
-        {"case": case.name, "strength": strength, "seed": 5000 + 17 * number + repeat}
+        {"case": case.name, "strength": strength, "seed": 5000 + 17 * number + repeat, "looks": looks}
         for number, case in enumerate(CASES)
         for strength in strengths
         if strength <= 1.0 or case.name != "gravity-gradient"  # its orbit would be inside the Earth
         for repeat in repeats
+    ]
+    right += [
+        {"case": name, "strength": 1.0, "seed": 400 + k, "looks": looks}
+        for name in UNUSUAL
+        for k in range(60 if full else 1)
     ]
     kinds = [(robot, size, noise) for robot in ROBOTS for size in AMPLITUDES for noise in NOISES]
     used = kinds if full else [("servicer3", 0.6, 1e-5)]
@@ -76,13 +86,19 @@ def trial(task: Mapping[str, Any], generator: np.random.Generator) -> dict[str, 
 
 
 def _right_study(task: Mapping[str, Any], folder: Path) -> Outcome:
-    case = next(case for case in CASES if case.name == task["case"])
-    study = Study.load(case.make(folder, task["seed"], task["strength"]))
+    name, seed, looks = task["case"], task["seed"], task["looks"]
+    case = next((case for case in CASES if case.name == name), None)
+    study = Study.load(UNUSUAL[name](folder, seed) if case is None else case.make(folder, seed, task["strength"]))
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
-    began = time.process_time()
-    said = tuple(convention.name for convention in find_conventions(model, manoeuvres))
-    return Outcome(case.name, False, case.urdf.stem, 0.0, 0.0, said, (), True, time.process_time() - began)
+    seconds, said = [], []
+    for changed, recorded in circumstances(model, manoeuvres, np.random.default_rng([seed, 2]), looks):
+        began = time.process_time()
+        said.append([convention.name for convention in find_conventions(changed, recorded)])
+        seconds.append(time.process_time() - began)
+    names = tuple(name for names in said for name in names)
+    robot = model.robot.name if case is None else case.urdf.stem
+    return Outcome(name, False, robot, 0.0, 0.0, names, (), True, max(seconds), looks, sum(map(bool, said)))
 
 
 def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:

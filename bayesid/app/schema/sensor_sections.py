@@ -13,7 +13,7 @@ from bayesid.app.schema.value_types import (
     ANGLE_SIGMA,
     Decimation,
     Name,
-    NonNegative,
+    Number,
     Numbers,
     PerAxis,
     PerName,
@@ -43,12 +43,12 @@ class SampledSensor(Section):
     native_rate : float, optional
         Rate at which new readings come, where they are held or interpolated between [Hz].
     latency : float, optional
-        Time by which the stamps of the readings are late [s].
+        Time by which the stamps of the readings are late, negative where they are early [s].
     """
 
     missing: Numbers = ()
     native_rate: Positive | None = None
-    latency: NonNegative = 0.0
+    latency: Number = 0.0
 
 
 class FilteredSensor(SampledSensor):
@@ -86,10 +86,13 @@ class MountedSensor(FilteredSensor):
         Quaternion from sensor to base axes.
     reflected : bool, optional
         Whether the axes of the readings are left-handed: all readings are counted the other way before mounting.
+    scale : float, optional
+        Factor of the readings to their unit, such as of counts.
     """
 
     mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
     reflected: bool = False
+    scale: Positive = 1.0
 
 
 class RateSensor(MountedSensor):
@@ -121,7 +124,7 @@ class RateSensor(MountedSensor):
     ) = None
     attitude_arcsec: Arcseconds | None = None
     bias_sigma: PerAxis | None = None
-    unit: Literal["rad/s", "deg/s", "mrad/s", "arcsec/s", "rev/s", "deg/h", "rpm"] = "rad/s"
+    unit: Literal["rad/s", "deg/s", "mdeg/s", "mrad/s", "arcsec/s", "rev/s", "deg/h", "rpm"] = "rad/s"
 
     @property
     def noise(self) -> Noise:
@@ -226,12 +229,15 @@ class EncoderSensor(SampledSensor):
         acceleration, by default estimated from the data.
     unit : str, optional
         Unit of the angles in the readings, such as "deg", by default "rad"; noise is in rad whatever it is.
+    scale : float, optional
+        Factor of all angles to that unit, such as of counts.
     """
 
     sigma: Annotated[PerName, ANGLE_SIGMA] | None = None
     velocity_sigma: Annotated[PerName, no_more_than(1.0, "rad/s, not degrees/s?")] | None = None
     acceleration_sigma: PerName | None = None
     unit: Literal["rad", "deg", "mrad", "arcsec", "rev"] = "rad"
+    scale: Positive = 1.0
 
     def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
         """Return the noise per sample of one joint's position, velocity or acceleration, None if not given.

@@ -27,12 +27,15 @@ class JointSection(Section):
         Factor of its position, velocity and acceleration, such as 0.001 for millimetres.
     column : str, optional
         Column ``position.OTHER`` that holds its position; its other readings are then in those of OTHER too.
+    latency : float, optional
+        Time by which its stamps are late, negative where they are early, in place of the encoders' [s].
     """
 
     sign: Annotated[int, Field(ge=-1, le=1)] = 1
     offset: Annotated[Number, FULL_TURN] = 0.0
     scale: Positive = 1.0
     column: Name | None = None
+    latency: Number = 0.0
 
     @model_validator(mode="after")
     def _check(self) -> JointSection:

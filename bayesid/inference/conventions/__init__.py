@@ -11,6 +11,7 @@ from bayesid.inference.conventions import (  # the families register themselves
     quaternion_conventions,
     reading_units,
     sensor_axes,
+    shifted_channels,
 )
 from bayesid.inference.conventions.convention_search import find_conventions, refuse_conventions
 from bayesid.inference.conventions.mistake import Mistake, MistakeFamily, convention_families
@@ -27,4 +28,5 @@ __all__ = [
     "reading_units",
     "refuse_conventions",
     "sensor_axes",
+    "shifted_channels",
 ]

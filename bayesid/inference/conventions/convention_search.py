@@ -16,13 +16,11 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import log_sum
-from bayesid.inference.conventions.joint_counting import zero_of
-from bayesid.inference.conventions.mistake import Mistake, convention_families
+from bayesid.inference.conventions.mistake import LEVELS, Mistake, convention_families
 from bayesid.inference.conventions.momentum_balance import BalanceFit, BalanceProblem, MomentumBalance
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
 from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.recorded_as import RecordedAs, SensorRecordedAs
-from bayesid.recording.recording import Recording
 from bayesid.recording.suspect_readings import suspect_readings
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
@@ -40,7 +38,6 @@ COARSE, FINE = 2, 10  # iterations of the fit that selects members, and of that 
 LIKELY, KEPT = 10, 4  # numbers of members that are fitted well at these instants, and that are weighed
 INSTANTS = 40  # number of instants by which members are selected
 RECORDINGS = 2  # number of recordings that are looked at, as a mistake is in all of them
-ZERO_STEPS = np.deg2rad([15.0, 5.0, 1.5, 0.5])  # refinement of a joint's zero
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,11 @@ class _MistakeSet:
         return float(sum(gain for fit in self.fits for name, gain in fit.gains.items() if not parts or name in parts))
 
     @property
+    def made(self) -> list[Mistake]:
+        """The mistakes one by one."""
+        return [part for mistake in self.mistakes for part in mistake.parts or (mistake,)]
+
+    @property
     def could_gain(self) -> bool:
         """Whether the misfit of some part of the balance could fall by as much as it must for a name."""
         return any(fit.misfit[name] > GAIN * floor for fit in self.fits for name, floor in fit.floors.items())
@@ -74,7 +76,8 @@ class _Search:
         known = {prior.name for prior in model.bodies}
         spreads = [prior.spread for prior in model.priors if prior.name not in known]
         self.balance = MomentumBalance(model.robot, model.bodies, model.rate_sigma, max(spreads, default=0.0))
-        self.recorded = [ReadingsOnGrid.of(model, manoeuvre) for manoeuvre in manoeuvres[:RECORDINGS]]
+        stated = np.array([manoeuvre.attitude for manoeuvre in manoeuvres])
+        self.recorded = [ReadingsOnGrid.of(model, manoeuvre, stated) for manoeuvre in manoeuvres[:RECORDINGS]]
         self.few = [max(self.recorded, key=_motion).thinned(INSTANTS)]
         self.model = model
         self._problems: dict[tuple[int, bytes], BalanceProblem] = {}
@@ -147,17 +150,14 @@ class _Search:
         return sorted(fitted, key=lambda considered: -considered.log_weight)[:KEPT]
 
     def _refined(self, considered: _MistakeSet) -> _MistakeSet:
-        """Return the set with the zeros of joints refined."""
-        for step in ZERO_STEPS:
-            for sign in (1.0, -1.0):
-                for place, mistake in enumerate(considered.mistakes):
-                    if mistake.offset is None:
-                        continue
-                    moved = zero_of(*mistake.offset[:2], mistake.offset[2] + sign * step, mistake.share)
-                    mistakes = (*considered.mistakes[:place], moved, *considered.mistakes[place + 1 :])
-                    other = self.weigh(mistakes, considered.log_prior)
-                    if other.log_weight > considered.log_weight:
-                        considered = other
+        """Return the set with members of continuous families refined."""
+        for level in range(LEVELS):
+            for place, mistake in enumerate(considered.mistakes):
+                others = considered.mistakes[:place], considered.mistakes[place + 1 :]
+                sets = [
+                    self.weigh((*others[0], near, *others[1]), considered.log_prior) for near in mistake.nearby(level)
+                ]
+                considered = max([considered, *sets], key=lambda one: one.log_weight)
         return considered
 
 
@@ -215,9 +215,7 @@ def _without(manoeuvre: Manoeuvre, conventions: Sequence[Convention]) -> Manoeuv
         if suspect.convention is not None:
             rate = 1.0 / suspect.interval if suspect.interval else 0.0
             sensors[suspect.columns[0].partition(".")[0]] = SensorRecordedAs(suspect.value, rate)
-    channels = RecordedAs(sensors=sensors).converted({"time": recording.time, **recording.channels})
-    time = channels.pop("time")
-    return replace(manoeuvre, recording=Recording(recording.name, recording.file, time, channels))
+    return replace(manoeuvre, recording=recording.converted(RecordedAs(sensors=sensors)))
 
 
 def _by_balance(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Convention]:
@@ -238,20 +236,27 @@ def _by_balance(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[Conventio
     sees_motion = any(fit.signals[name] > GAIN * fit.misfit[name] for fit in best.fits for name in fit.misfit)
     if np.exp(declared.log_weight - total) > 1.0 - BELIEVED or max(explained, default=0.0) < GAIN:
         return []
-    if not (leaves_nothing and sees_motion):
+    if not (leaves_nothing and sees_motion) or any(mistake.effect for mistake in best.mistakes):
         return []
-    conventions: dict[tuple[str, str], Convention] = {}
+    conventions: list[tuple[Mistake, Convention]] = []
     for considered in sorted(weighed, key=lambda considered: -considered.log_weight):
         probability = float(np.exp(considered.log_weight - total))
-        if probability < MENTIONED:
+        if probability < MENTIONED or any(mistake.effect for mistake in considered.mistakes):
             continue
         readings = search.recorded[0]
-        for mistake in considered.mistakes:
+        for mistake in considered.made:
             remedy = mistake.remedy(readings)
-            before = conventions.get((mistake.name, remedy))
-            sum_ = probability + (0.0 if before is None else before.probability)
-            conventions[mistake.name, remedy] = Convention(
-                mistake.name, mistake.channel, remedy, mistake.text(readings), sum_
-            )
+            same = [
+                k
+                for k, (other, said) in enumerate(conventions)
+                if other.is_like(mistake) or (said.name, said.remedy) == (mistake.name, remedy)
+            ]
+            if same:
+                other, said = conventions[same[0]]
+                conventions[same[0]] = other, replace(said, probability=said.probability + probability)
+            else:
+                text = mistake.text(readings)
+                said = Convention(mistake.name, mistake.channel, remedy, text, probability)
+                conventions.append((mistake, said))
             readings = mistake.undo(readings)
-    return list(conventions.values())
+    return [convention for _, convention in conventions]

@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.conventions.mistake import Mistake, MistakeFamily
+from bayesid.inference.conventions.reading_units import in_unit
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
 from bayesid.recording.units import STANDARD_GRAVITY, UNITS
 from bayesid.simulation.model import Model
@@ -20,7 +21,7 @@ TOLERANCE = 0.02  # relative difference from standard gravity on the ground, by 
 
 @MistakeFamily.register
 class GravityInReadings(MistakeFamily):
-    """Readings whose mean is gravity, which their unit says up to a factor."""
+    """Readings whose mean is gravity, whose size says their unit."""
 
     title = "gravity in accelerations"
 
@@ -31,10 +32,11 @@ class GravityInReadings(MistakeFamily):
             return
         for fixed in ("sensor", "space"):
             size = float(np.linalg.norm(_gravity(readings, fixed)[0]))
-            for factor in set(UNITS["accel"].values()):
+            for unit, factor in UNITS["accel"].items():
                 if abs(size * factor / STANDARD_GRAVITY - 1.0) < TOLERANCE:
-                    yield _with_gravity(fixed)
-                    break
+                    gravity = _with_gravity(fixed)
+                    in_other = in_unit(SensorKind.ACCEL, unit, factor, gravity.share)
+                    yield gravity if factor == 1.0 else Mistake.together(in_other, gravity)
 
 
 def _gravity(readings: ReadingsOnGrid, fixed: str) -> tuple[Floats, Floats]:
@@ -63,6 +65,6 @@ def _with_gravity(fixed: str) -> Mistake:
     def text(readings: ReadingsOnGrid) -> str:
         size = float(np.linalg.norm(_gravity(readings, fixed)[0]))
         where = "the sensor's axes" if fixed == "sensor" else "space"
-        return f"The accelerometer reads gravity, {size:.4g} as recorded, constant in {where}: it was on the ground."
+        return f"The accelerometer reads gravity, {size:.4g} m/s2, constant in {where}: it was on the ground."
 
     return Mistake("convention:gravity:accel", "accel", "gravity:accel", 1, undo, remedy, text, 0.5, ("accel",))

@@ -18,6 +18,9 @@ __all__ = ["JointSign", "JointZero"]
 MOVES = 1e-2  # range of a joint's motion from which its sign can matter [rad or m]
 ZEROS = np.deg2rad([-150.0, -120.0, -90.0, -60.0, -45.0, -30.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0])
 
+STEPS = np.deg2rad([15.0, 5.0, 1.5, 0.5])  # refinement of a zero
+ALIKE = np.deg2rad(5.0)  # difference of zeros that are not told apart
+
 
 @MistakeFamily.register
 class JointSign(MistakeFamily):
@@ -39,7 +42,7 @@ def _other_way(index: int, name: str, share: float) -> Mistake:
         f"sign:{name}",
         2,
         lambda seen: _counted(seen, index, -1.0, 0.0),
-        lambda seen: f'[joints."{name}"]\nsign = -1',
+        lambda seen: _stated(_counted(seen, index, -1.0, 0.0), name, "sign"),
         lambda seen: f"Joint {name} counts the other way than in the robot's file.",
         share,
     )
@@ -52,25 +55,14 @@ class JointZero(MistakeFamily):
     title = "zeros of joints"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
-        """Yield usual zeros of every revolute joint; the search refines them (`refined`)."""
+        """Yield usual zeros of every revolute joint, which the search refines."""
         for index, joint in enumerate(model.robot.joints):
             for offset in ZEROS if joint.unit == "rad" else ():
-                yield zero_of(index, joint.name, float(offset), 1.0 / len(ZEROS) / len(model.robot.joints))
+                yield _zero_of(index, joint.name, float(offset), 1.0 / len(ZEROS) / len(model.robot.joints))
 
 
-def zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
-    """Return the mistake that a joint's angle lacks an offset.
-
-    Parameters
-    ----------
-    index : int
-        Joint in the order of the robot.
-    name : str
-    offset : float
-        What is to be added [rad].
-    share : float
-        Share of the family's prior.
-    """
+def _zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
+    """Return the mistake that a joint's angle lacks an offset [rad]."""
     offset = float(np.pi - (np.pi - offset) % (2.0 * np.pi))  # within half a turn
     return Mistake(
         f"convention:zero:{name}",
@@ -78,10 +70,13 @@ def zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
         f"zero:{name}",
         3,
         lambda seen: _counted(seen, index, 1.0, offset),
-        lambda seen: f'[joints."{name}"]\noffset = {offset:.6g}',
+        lambda seen: _stated(_counted(seen, index, 1.0, offset), name, "offset"),
         lambda seen: f"Joint {name} counts from another zero: add {np.rad2deg(offset):.3g} degrees to its angle.",
         share,
-        offset=(index, name, offset),
+        nearby=lambda level: tuple(
+            _zero_of(index, name, offset + step, share) for step in (STEPS[level], -STEPS[level])
+        ),
+        value=offset / ALIKE,
     )
 
 
@@ -91,4 +86,15 @@ def _counted(readings: ReadingsOnGrid, index: int, sign: float, offset: float) -
         changed = np.array(values)
         changed[:, index] = sign * changed[:, index] + (offset if order == 0 else 0.0)
         parts.append(changed)
-    return replace(readings, joints=JointState(*parts))
+    name = readings.names[index]
+    before = readings.recorded_as.joint(name)
+    after = replace(before, sign=sign * before.sign, offset=sign * before.offset + offset)
+    return readings.with_joints(JointState(*parts), {name: after})
+
+
+def _stated(readings: ReadingsOnGrid, name: str, key: str) -> str:
+    """Return the lines of the study that state the sign or the offset of a joint, or both where both are no default."""
+    joint = readings.recorded_as.joint(name)
+    lines = [f"sign = {joint.sign:.0f}"] if key == "sign" else []
+    lines += [f"offset = {joint.offset:.6g}"] if key == "offset" or joint.offset else []
+    return "\n".join([f'[joints."{name}"]', *lines])

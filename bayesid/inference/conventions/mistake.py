@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import ClassVar, TypeVar
 
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
 from bayesid.simulation.model import Model
 
-__all__ = ["Mistake", "MistakeFamily", "convention_families"]
+__all__ = ["LEVELS", "Mistake", "MistakeFamily", "convention_families"]
+
+LEVELS = 4
+"""Number of levels at which members of continuous families are refined, each finer than the last."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class Mistake:
     place : str
         What it changes; of two mistakes in one place only one is made.
     rank : int
-        Mistakes are undone in the order of their ranks: units, gravity, then axes and joints.
+        Mistakes are undone in the order of their ranks: times, units, gravity, then axes and joints.
     undo : callable
         Readings as they would be without the mistake.
     remedy, text : callable
@@ -32,8 +36,14 @@ class Mistake:
         Share of the family's prior probability.
     seen_by : tuple of str
         Parts of the balance that the mistake disturbs; by default all.
-    offset : tuple of int, str and float, optional
-        Joint, its name and what is added to its angle, where the search may refine it.
+    nearby : callable, optional
+        Members near it at a level of refinement from 0 to `LEVELS` - 1, where the family is continuous.
+    value : float, optional
+        What is wrong by how much, in a continuous family: two members less than one apart are the same mistake.
+    parts : tuple of Mistake, optional
+        Mistakes that it stands for, made together, in the order in which they are undone.
+    effect : bool
+        Whether it is no convention but an effect of the catalogue, which is left to a diagnosis where it explains most.
     """
 
     name: str
@@ -45,7 +55,26 @@ class Mistake:
     text: Callable[[ReadingsOnGrid], str]
     share: float
     seen_by: tuple[str, ...] = ()
-    offset: tuple[int, str, float] | None = None
+    nearby: Callable[[int], tuple[Mistake, ...]] = lambda level: ()
+    value: float | None = None
+    parts: tuple[Mistake, ...] = ()
+    effect: bool = False
+
+    @classmethod
+    def together(cls, *parts: Mistake) -> Mistake:
+        """Return the mistake of making several at once, in the place of the first."""
+
+        def undo(readings: ReadingsOnGrid) -> ReadingsOnGrid:
+            return reduce(lambda seen, part: part.undo(seen), parts, readings)
+
+        share = min(part.share for part in parts)
+        return replace(parts[0], undo=undo, share=share, parts=parts)
+
+    def is_like(self, other: Mistake) -> bool:
+        """Whether another member of the same continuous family says the same."""
+        if self.name != other.name or self.value is None or other.value is None:
+            return False
+        return abs(self.value - other.value) < 1.0
 
 
 class MistakeFamily:

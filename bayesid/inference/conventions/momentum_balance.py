@@ -28,7 +28,7 @@ from bayesid.robot.log_cholesky import upper_cholesky
 from bayesid.robot.robot import Robot
 from bayesid.simulation.sensors import SensorKind
 
-__all__ = ["BalanceFit", "MomentumBalance"]
+__all__ = ["BalanceFit", "MomentumBalance", "mean_between"]
 
 GENERIC = 0.02  # share of the readings by which any simulation may miss them
 INDEPENDENT = 10.0  # number of instants at which errors of a simulation, which last for long, count as independent
@@ -282,10 +282,10 @@ class BalanceProblem:
             result["accel"] = miss.reshape(len(z), -1)
         pairs, turning = seen.turns
         if len(pairs):
-            mean = _between(seen.time, rate, pairs)
+            mean = mean_between(seen.time, rate, pairs)
             result["attitude"] = (turning - mean).reshape(len(z), -1)
             if gyro is not None:
-                mean = _between(seen.time, gyro.in_base[None] - rate_error, pairs)
+                mean = mean_between(seen.time, gyro.in_base[None] - rate_error, pairs)
                 result["turning"] = (turning - mean).reshape(len(z), -1)
         if seen.begins:
             off = (Rotation.from_quat(seen.start).inv() * Rotation.from_quat(seen.attitude[0])).as_rotvec()
@@ -360,8 +360,18 @@ def _accumulated(time: Floats, values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
-def _between(time: Floats, rate: Floats, pairs: Floats) -> Floats:
-    """Return the mean of rates (B, n, 3) between pairs of times (m, 2), shape (B, m, 3)."""
+def mean_between(time: Floats, rate: Floats, pairs: Floats) -> Floats:
+    """Return the means of rates between pairs of times, shape (B, m, 3) [rad/s].
+
+    Parameters
+    ----------
+    time : (n,) array
+        [s]
+    rate : (B, n, 3) array
+        [rad/s]
+    pairs : (m, 2) array
+        [s]
+    """
     steps = 0.5 * (rate[:, 1:] + rate[:, :-1]) * np.diff(time)[:, None]
     total = np.concatenate([np.zeros((len(rate), 1, 3)), np.cumsum(steps, axis=1)], axis=1)
 

@@ -13,12 +13,14 @@ from scipy.spatial.transform import Rotation, Slerp
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.actions import Actions
+from bayesid.recording.joint_motion import Motion
+from bayesid.recording.recorded_as import JointRecordedAs, RecordedAs
 from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
 
-__all__ = ["GridSensor", "ReadingsOnGrid"]
+__all__ = ["GridSensor", "GridSource", "ReadingsOnGrid"]
 
 MOST = 160  # number of instants, enough for the motion of a manoeuvre
 GAP = 8.0  # intervals of samples above which nobody knows how the base turned meanwhile
@@ -60,6 +62,31 @@ class GridSensor:
 
 
 @dataclass(frozen=True)
+class GridSource:
+    """What was recorded at all times, for readings with other stamps.
+
+    Attributes
+    ----------
+    time : (m,) array
+        The whole grid [s].
+    motion : Motion
+        Of the joints.
+    series : mapping of SensorKind to tuple of arrays
+        Times (k,) and samples of each sensor.
+    intervals : mapping of str to float
+        Time between samples of each channel [s].
+    use : slice
+        Instants of the grid that are used.
+    """
+
+    time: Floats
+    motion: Motion
+    series: Mapping[SensorKind, tuple[Floats, Floats]]
+    intervals: Mapping[str, float]
+    use: slice = field(default_factory=lambda: slice(None))
+
+
+@dataclass(frozen=True)
 class ReadingsOnGrid:
     """Readings of one recording, as recorded or as a hypothesis has them.
 
@@ -83,8 +110,16 @@ class ReadingsOnGrid:
         Momentum of the wheels and its derivative, base axes [N m s, N m].
     force, torque : (n, 3) arrays
         Recorded actions on the base, base axes [N, N m].
+    source : GridSource
+        What was recorded at all times.
+    stated : (r, 4) array
+        Attitudes at time 0 that the study states of all its recordings.
     orbit_rate : float
         Rate of the orbit, 0 without one [rad/s].
+    names : tuple of str
+        Joints.
+    recorded_as : RecordedAs
+        Conventions that the study states, and those of a hypothesis in their place.
     """
 
     time: Floats
@@ -99,17 +134,22 @@ class ReadingsOnGrid:
     wheel_torque: Floats
     force: Floats
     torque: Floats
+    source: GridSource
+    stated: Floats
     orbit_rate: float = 0.0
-    names: tuple[str, ...] = field(default=())
+    names: tuple[str, ...] = ()
+    recorded_as: RecordedAs = field(default_factory=RecordedAs)
 
     @classmethod
-    def of(cls, model: Model, manoeuvre: Manoeuvre) -> ReadingsOnGrid:
+    def of(cls, model: Model, manoeuvre: Manoeuvre, stated: Floats | None = None) -> ReadingsOnGrid:
         """Return the readings of one recording as declared.
 
         Parameters
         ----------
         model : Model
         manoeuvre : Manoeuvre
+        stated : (r, 4) array, optional
+            Attitudes that the study states.
         """
         recording = manoeuvre.recording
         series = {
@@ -157,8 +197,11 @@ class ReadingsOnGrid:
             wheel_torque,
             wrench[:, :3],
             wrench[:, 3:],
+            GridSource(time, manoeuvre.motion, series, _intervals(recording, series)),
+            np.zeros((0, 4)) if stated is None else stated,
             0.0 if model.orbit is None else model.orbit.mean_motion,
             tuple(joint.name for joint in model.robot.joints),
+            recording.recorded_as,
         )
 
     def with_sensor(self, kind: SensorKind, values: Floats, unit: float = 1.0) -> ReadingsOnGrid:
@@ -174,7 +217,21 @@ class ReadingsOnGrid:
         """
         before = self.sensors[kind]
         changed = replace(before, values=values, unit=unit * before.unit, sigma=unit * before.sigma)
-        return replace(self, sensors={**self.sensors, kind: changed})
+        stated = self.recorded_as.sensor(kind.value)
+        recorded_as = self.recorded_as.with_sensor(kind.value, replace(stated, unit=unit * stated.unit))
+        return replace(self, sensors={**self.sensors, kind: changed}, recorded_as=recorded_as)
+
+    def with_joints(self, joints: JointState, changes: Mapping[str, JointRecordedAs]) -> ReadingsOnGrid:
+        """Return the readings with another motion of the joints.
+
+        Parameters
+        ----------
+        joints : JointState
+        changes : mapping of str to JointRecordedAs
+            Conventions of joints that make it.
+        """
+        recorded_as = replace(self.recorded_as, joints={**self.recorded_as.joints, **changes})
+        return replace(self, joints=joints, recorded_as=recorded_as)
 
     def thinned(self, most: int) -> ReadingsOnGrid:
         """Return the readings at fewer instants, for a first selection."""
@@ -195,6 +252,7 @@ class ReadingsOnGrid:
             wheel_torque=self.wheel_torque[use],
             force=self.force[use],
             torque=self.torque[use],
+            source=replace(self.source, use=use),
         )
 
     @cached_property
@@ -206,6 +264,38 @@ class ReadingsOnGrid:
         change = (attitude[:-1].inv() * attitude[1:]).as_rotvec()
         pairs = np.column_stack([self.attitude_time[:-1], self.attitude_time[1:]])
         return pairs, change / np.diff(pairs, axis=1)
+
+    def stamped(self, channel: str, latency: float) -> ReadingsOnGrid:
+        """Return the readings with one channel earlier than its stamps say.
+
+        Parameters
+        ----------
+        channel : str
+            A sensor, ``position`` for all joints, or ``position.JOINT``.
+        latency : float
+            [s]
+        """
+        family, _, joint = channel.partition(".")
+        source = self.source
+        if family == "position":
+            columns = [self.names.index(joint)] if joint else list(range(len(self.names)))
+            other = [values[source.use] for values in source.motion.evaluate(source.time + latency)]
+            moved = JointState(*(np.array(values) for values in self.joints))
+            for values, late in zip(moved, other, strict=True):
+                values[:, columns] = late[:, columns]
+            return replace(self, joints=moved, recorded_as=self.recorded_as.later(channel, latency))
+        kind = SensorKind.of(family)
+        if kind == SensorKind.ATTITUDE:
+            time = self.attitude_time - latency
+            use = (time >= self.time[0]) & (time <= self.time[-1])
+            recorded_as = self.recorded_as.later(family, latency)
+            return replace(self, attitude_time=time[use], attitude=self.attitude[use], recorded_as=recorded_as)
+        times, values = source.series[kind]
+        averaged, present, _ = _averages(times - latency, values, source.time)
+        changed = replace(self.sensors[kind], values=averaged[source.use], present=present[source.use])
+        return replace(
+            self, sensors={**self.sensors, kind: changed}, recorded_as=self.recorded_as.later(family, latency)
+        )
 
     @property
     def begins(self) -> bool:
@@ -233,6 +323,15 @@ class ReadingsOnGrid:
 
 def _positions(recording: Recording) -> list[str]:
     return [joint for joint in recording.joints if f"position.{joint}" in recording.channels]
+
+
+def _intervals(recording: Recording, series: Mapping[SensorKind, tuple[Floats, Floats]]) -> dict[str, float]:
+    """Return the median time between samples of each channel [s]."""
+    times = {kind.value: sampled for kind, (sampled, _) in series.items()}
+    times |= {f"position.{name}": recording.series(f"position.{name}")[0] for name in _positions(recording)}
+    intervals = {channel: float(np.median(np.diff(sampled))) for channel, sampled in times.items() if len(sampled) > 1}
+    joints = [interval for channel, interval in intervals.items() if channel.startswith("position.")]
+    return intervals | ({"position": float(np.median(joints))} if joints else {})
 
 
 def _longest_stretch(series: list[Floats]) -> tuple[float, float]:
