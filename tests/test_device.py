@@ -7,10 +7,15 @@ from collections.abc import Callable
 import jax
 import numpy as np
 import pytest
+from test_hidden_vibration import instants
 
 from bayesid._math.device import Device, device
-from bayesid.inference import ensemble, posterior
+from bayesid.diagnosis.response import hidden_vibration
+from bayesid.diagnosis.response.hidden_vibration import Vibration
+from bayesid.inference import ensemble, perturbed_posterior, posterior
+from bayesid.inference.perturbed_posterior import LinearResponses
 from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import FuelSlosh
 
 H100 = Device("gpu", 80e9)
 
@@ -43,6 +48,42 @@ def test_the_likelihood_does_not_depend_on_the_batches(planar_case, monkeypatch)
     monkeypatch.setattr(posterior, "device", lambda: Device("gpu", 2.0 * 8.9 * given.bytes_per_point))
     np.testing.assert_allclose(given.log_likelihoods(z), expected, rtol=1e-12)
     assert shapes == [8, 8, 8]
+
+
+def test_responses_do_not_depend_on_the_batches(planar_case, monkeypatch):
+    given: Posterior = planar_case.posterior
+    responses = LinearResponses.about(given, given.starting_point(), given.data.arrays)
+    rng, readings = np.random.default_rng(1), responses.motion.reading.shape
+    raw, offset = rng.normal(size=(21, *readings)), rng.normal(size=(21, *given.data.arrays.offset.shape))
+    expected = responses.whitened(raw, offset)
+    sizes = []
+    read_out = perturbed_posterior.compiled.read_out
+    monkeypatch.setattr(
+        perturbed_posterior.compiled, "read_out", lambda *given: (sizes.append(len(given[-1])), read_out(*given))[1]
+    )
+    per_change = posterior.COPIES * 8.0 * (raw[0].size + offset[0].size + expected[0].size)
+    monkeypatch.setattr(perturbed_posterior, "device", lambda: Device("gpu", 2.0 * 8.9 * per_change))
+    np.testing.assert_allclose(responses.whitened(raw, offset), expected, rtol=1e-12, atol=1e-14)
+    assert sizes == [8, 8, 8]
+    monkeypatch.setattr(perturbed_posterior, "device", lambda: H100)
+    responses.whitened(raw, offset)
+    assert sizes[3:] == [32]
+
+
+def test_vibrations_do_not_depend_on_the_batches(monkeypatch):
+    node = instants(np.arange(0.0, 5.1, 0.5))
+    vibration = Vibration.along(node, node)
+    values = np.array([[3.0, 0.1 + 0.01 * number, 0.01, 0.0, 0.0, 0.0] for number in range(21)])
+    expected = vibration.rows(FuelSlosh(), values)
+    sizes = []
+    oscillate = hidden_vibration._oscillate
+    monkeypatch.setattr(
+        hidden_vibration, "_oscillate", lambda *given: (sizes.append(len(given[0])), oscillate(*given))[1]
+    )
+    monkeypatch.setattr(hidden_vibration, "device", lambda: H100)
+    for batched, alone in zip(vibration.rows(FuelSlosh(), values), expected, strict=True):
+        np.testing.assert_allclose(batched, alone, rtol=1e-12, atol=1e-15)
+    assert sizes == [32]
 
 
 def test_the_sampler_offers_a_device_enough_points_at_once(monkeypatch):

@@ -35,7 +35,7 @@ class Device(NamedTuple):
             return 1
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
-    def batch(self, points: int, size: float) -> int:
+    def batch(self, points: int, size: float, processor: int = PROCESSOR) -> int:
         """Return the number of points to evaluate together; powers of two, so that few numbers need compilation.
 
         Parameters
@@ -44,9 +44,11 @@ class Device(NamedTuple):
             Number of points to evaluate.
         size : float
             Memory of one of them [bytes].
+        processor : int
+            Number that a processor takes together.
         """
         if self.platform == "cpu":
-            return PROCESSOR
+            return processor
         fit = max(1, min(MOST, int(SHARE * self.memory / size)))
         return min(1 << (max(points, 1) - 1).bit_length(), 1 << (fit.bit_length() - 1))
 

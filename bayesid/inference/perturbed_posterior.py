@@ -15,12 +15,13 @@ import jax
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.device import device
 from bayesid._math.on_device import on_device
 from bayesid._math.resampling import hermite_weights
 from bayesid._math.runge_kutta import STAGE_TIMES, TABLEAU
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Numbers, Perturbation, Structure, Traced, perturbed
-from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior import COPIES, Posterior
 from bayesid.inference.unknowns import part_of_prior
 from bayesid.robot.composite_tables import WIDTH
 from bayesid.simulation.dynamics import LinearMotion
@@ -72,7 +73,7 @@ def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
 
 
 BATCH = 32
-"""Number of perturbations that are treated together."""
+"""Number of perturbations that a processor treats together."""
 
 
 @dataclass(frozen=True)
@@ -151,11 +152,13 @@ class LinearResponses:
         at = (self.structure, self.numbers, on_device(self.z), self.arrays)
         shape = (len(self.arrays.start), self.arrays.start.shape[1], self.arrays.weights.shape[2])
         parts = [np.zeros((0, *shape))]
-        for first in range(0, len(offset), BATCH):
-            batch = [x[first : first + BATCH] for x in (raw, offset)]
-            missing = BATCH - len(batch[0])
-            padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in batch]
-            parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: BATCH - missing])
+        size = COPIES * 8.0 * (np.prod(raw.shape[1:]) + np.prod(offset.shape[1:]) + np.prod(shape))
+        batch = device().batch(len(offset), size, BATCH)
+        for first in range(0, len(offset), batch):
+            given = [x[first : first + batch] for x in (raw, offset)]
+            missing = batch - len(given[0])
+            padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in given]
+            parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: batch - missing])
         return np.concatenate(parts)
 
     def _raw(self, perturbations: Perturbation) -> Floats:

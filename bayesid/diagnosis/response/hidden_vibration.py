@@ -16,6 +16,7 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
+from bayesid._math.device import device
 from bayesid._math.double_precision import in_double_precision
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
@@ -30,8 +31,8 @@ __all__ = ["Vibration"]
 FINE = 0.1
 """Integration step of the oscillators [s]."""
 
-BATCHES = (1, 16)
-"""Sets of oscillators integrated together, whichever fits."""
+BATCH = 16
+"""Sets of oscillators that a processor integrates together, unless there is but one."""
 
 
 class Vibration(NamedTuple):
@@ -83,7 +84,9 @@ class Vibration(NamedTuple):
         moments = np.asarray(modes.moment).reshape(*coupling.shape[:2], 9)
         load = np.concatenate([coupling, moments], axis=-1)
         pieces = []
-        batch = BATCHES[0] if len(values) == 1 else BATCHES[1]
+        count, modes_of_set = omega.shape
+        size = 8.0 * self.compliance.size * (1.0 + modes_of_set)  # of pushes and softness at every instant [bytes]
+        batch = 1 if count == 1 else device().batch(count, size, BATCH)
         for first in range(0, len(values), batch):
             chosen = np.minimum(np.arange(first, first + batch), len(values) - 1)
             found = _oscillate(
