@@ -13,6 +13,7 @@ from bayesid.app.functions.identifiability_of_study import (
     identifiability as identifiability,
 )
 from bayesid.app.functions.identify_study import identify as identify
+from bayesid.app.functions.loop_study import LoopResult as LoopResult
 from bayesid.app.functions.loop_study import loop as loop
 from bayesid.app.functions.predict_study import Predictions as Predictions
 from bayesid.app.functions.predict_study import predict as predict

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from test_loop import ENCODER, PROBLEM, TRUE, model_of
 
 from bayesid._io.errors import InputError
+from bayesid.app.functions.loop_study import LoopResult
 from bayesid.design import CauseProbability, Loop, QuantitySd, RelativePrecision, TipRegion
 from bayesid.design.base_prediction import predict
 from bayesid.design.loop_goals import Review, StepKnowledge
@@ -163,6 +164,33 @@ def test_a_loop_stops_where_its_model_is_wrong(tmp_path: Path):
     again = loop_of(FINE, WRONG, goals=(RelativePrecision(1.0),)).run(Still(), tmp_path)
     assert (again.status, len(again.steps)) == ("wrong-model", 2)
     assert loop_of(WRONG, goals=(RelativePrecision(1.0),)).run(Still(), tmp_path / "other").status == "wrong-model"
+
+
+@pytest.mark.usefixtures("planned")
+def test_the_result_of_a_loop_names_its_bodies_goals_and_causes(tmp_path: Path):
+    result = LoopResult("Träger", loop_of(FINE, WRONG).run(Still(), tmp_path))
+    written = json.loads((tmp_path / "loop.json").read_text())
+    assert result.to_dict() == {key: written[key] for key in ("status", "steps")}
+    first, last = result.steps
+    mass = written["steps"][1]["identification"]["bodies"]["base_link"]["mass"]
+    assert result.bodies["base_link"].mass.to_dict() == pytest.approx(mass)
+    assert first.bodies["base_link"].mass.mean != pytest.approx(mass["mean"], rel=1e-9)
+    assert (first.causes, last.causes) == ((), ("payload:link2",))
+    (goal,) = last.goals
+    assert (goal.wanted, goal.reached) == (1e-9, False)
+    assert goal.value == pytest.approx(0.01, rel=0.05)
+    assert last.recording == tmp_path / "step-2-recording.csv"
+    assert "The model is wrong: after 2 manoeuvres" in str(result)
+    assert "<p>The model is wrong: after 2 manoeuvres" in result._repr_html_()
+
+
+@pytest.mark.usefixtures("planned")
+def test_a_loop_that_waits_has_a_result_without_bodies(tmp_path: Path):
+    result = LoopResult("", loop_of().run(None, tmp_path))
+    (step,) = result.steps
+    assert (result.status, result.bodies, step.goals, step.causes) == ("waiting", {}, (), ())
+    assert step.plan.is_file()
+    assert f"Fly {step.plan}" in str(result)
 
 
 @pytest.mark.usefixtures("planned")

@@ -50,7 +50,6 @@ def run(
     from bayesid.app.functions.loop_study import loop
     from bayesid.app.report_origin import report_origin
     from bayesid.report import loop_report
-    from bayesid.report.loop_report import loop_sentences
 
     asked: dict[str, Any] = {
         "spacecraft": spacecraft,
@@ -61,14 +60,14 @@ def run(
         "at_most": at_most,
         "diagnose": diagnose,
     }
-    history = loop(study, output, seed, effective_samples=effective_samples, **asked, progress=progress)
-    written = any("identification" in step for step in history.steps)
+    result = loop(study, output, seed, effective_samples=effective_samples, **asked, progress=progress)
+    written = any("identification" in step for step in result.history.steps)
     if written:
         origin = report_origin(
             study, "loop", seed, output=output, samples=effective_samples, wanted=asked.pop("precision"), **asked
         )
-        loop_report(history, study.title, output / "report.pdf", origin=origin)
-    yield from loop_sentences(history)
+        loop_report(result.history, study.title, output / "report.pdf", origin=origin)
+    yield from result.summary().sentences
     if written:
         yield f"Wrote {output / 'report.pdf'}."
-    yield f"Wrote {history.folder / 'loop.json'}."
+    yield f"Wrote {result.history.folder / 'loop.json'}."

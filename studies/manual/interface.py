@@ -12,7 +12,10 @@ import bayesid
 from bayesid.inference.body_quantities import BodyDraws, QuantityDraws
 
 # classes whose members the manual lists: results of the functions, and what a sampler needs
-RESULTS = ("StudyCheck", "Identification", "Diagnosis", "Identifiability", "Designs", "Predictions", "Simulation")
+RESULTS = (
+    *("StudyCheck", "Identification", "Diagnosis", "Identifiability"),
+    *("Designs", "Predictions", "Simulation", "LoopResult"),
+)
 SAMPLING = ("Posterior", "Emcee", "Sampler", "SamplingTarget", "PosteriorDraws")
 
 

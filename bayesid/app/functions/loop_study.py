@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import claimed_folder
 from bayesid._io.progress import Progress, silent
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
 from bayesid.app.study_to_design import load_loop_problem
 from bayesid.app.study_to_encoders import encoder_noise
@@ -16,9 +20,116 @@ from bayesid.app.user_files import load_spacecraft
 from bayesid.design import Loop, Sampled, Spacecraft
 from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, RelativePrecision, TipRegion
 from bayesid.design.loop_history import History
+from bayesid.inference.body_quantities import BodyDraws
+from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.report.loop_report import loop_sentences
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.simulation.model import Model
 
-__all__ = ["loop"]
+__all__ = ["AssessedGoal", "LoopResult", "LoopStep", "loop"]
+
+
+class AssessedGoal(NamedTuple):
+    """What is wanted, and what a step reached.
+
+    Attributes
+    ----------
+    goal : str
+        What is wanted, in words.
+    value, wanted : float
+        Value after the step, and the one wanted.
+    unit : str
+    reached : bool
+    """
+
+    goal: str
+    value: float
+    wanted: float
+    unit: str
+    reached: bool
+
+
+@dataclass(frozen=True)
+class LoopStep:
+    """One step of a loop.
+
+    Attributes
+    ----------
+    number : int
+        Number of the step, from 1.
+    plan, recording, posterior : Path
+        Files of the joints' motion to fly, of what was recorded, and of the draws; the later ones may not exist yet.
+    entry : dict
+        Content of the step in loop.json.
+    """
+
+    number: int
+    plan: Path
+    recording: Path
+    posterior: Path
+    entry: dict[str, Any]
+
+    @cached_property
+    def bodies(self) -> dict[str, BodyDraws]:
+        """Draws of the bodies after this step, empty before its identification."""
+        names = list(self.entry.get("identification", {}).get("bodies", ()))
+        if not names:
+            return {}
+        values = mass_com_inertia(InertialDraws.read(self.posterior).of_bodies(names).values)
+        return {name: BodyDraws(name, values[:, index]) for index, name in enumerate(names)}
+
+    @property
+    def goals(self) -> tuple[AssessedGoal, ...]:
+        """What is wanted beside what the step reached, empty before its identification."""
+        return tuple(AssessedGoal(**goal) for goal in self.entry.get("goals", ()))
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Causes by which the recordings so far are explained."""
+        return tuple(self.entry.get("diagnosis", {}).get("causes", ()))
+
+
+@dataclass(frozen=True, repr=False)
+class LoopResult(ShortForm):
+    """Result of `loop`.
+
+    Attributes
+    ----------
+    title : str
+        Title of the study.
+    history : History
+        Entries of loop.json, and the folder of its files.
+    """
+
+    title: str
+    history: History
+
+    @property
+    def status(self) -> str:
+        """How it ended: ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``."""
+        return self.history.status
+
+    @cached_property
+    def steps(self) -> tuple[LoopStep, ...]:
+        """Steps so far."""
+        stages = ("plan", "recording", "identification")
+        return tuple(
+            LoopStep(step["step"], *(self.history.path(step["step"], stage) for stage in stages), step)
+            for step in self.history.steps
+        )
+
+    @property
+    def bodies(self) -> dict[str, BodyDraws]:
+        """Draws of the bodies as the last identified step leaves them, empty before the first."""
+        return next((step.bodies for step in reversed(self.steps) if step.bodies), {})
+
+    def summary(self) -> Summary:
+        """Return what every step told, how the loop ended, and what to do next."""
+        return Summary(list(loop_sentences(self.history)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of loop.json, without its key."""
+        return {"status": self.history.status, "steps": self.history.steps}
 
 
 def loop(
@@ -35,7 +146,7 @@ def loop(
     at_most: int = 5,
     diagnose: bool = True,
     progress: Progress = silent,
-) -> History:
+) -> LoopResult:
     """Plan a manoeuvre, have it executed, identify, diagnose, plan again, until what is wanted is known.
 
     Parameters
@@ -85,7 +196,7 @@ def loop(
     )
     executing = load_spacecraft(Path(spacecraft)) if isinstance(spacecraft, (str, Path)) else spacecraft
     with claimed_folder(Path(output)):
-        return made.run(executing, Path(output), progress)
+        return LoopResult(study.title, made.run(executing, Path(output), progress))
 
 
 def _goals(
