@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
-from studies.benchmark.device import LAST, DeviceTimes, device_goals
+from studies.benchmark.device import LAST, DeviceTimes, device_goals, search_seconds
 from studies.benchmark.report import STUDY, figures_of_merit, goals_of
 from studies.benchmark.run import Benchmark, Result, Rival, Sampling, chain, posterior_of, seconds_per_evaluation
 from studies.common.study import Verdict
@@ -62,17 +62,30 @@ def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
     assert values[cost] == pytest.approx([62.5] * 5)  # 250 evaluations a sample over 4
     verdicts = [goal.verdict for goal in goals_of(figures)]
     assert verdicts == [Verdict.PASS, Verdict.OPEN, Verdict.PASS, Verdict.FAIL, *[Verdict.PASS] * 3]
-    STUDY.write(Result(runs, True), tmp_path / "benchmark.pdf")
+    STUDY.write(Result(runs, True, search=12.3), tmp_path / "benchmark.pdf")
     text = PdfText.read(tmp_path / "benchmark.pdf")
     assert "150 (100 to 200) µs" in text
     assert "varies by a factor of 2, the ratios to the other simulators by 2 and 2" in text
     assert "400000 on the last one, NVIDIA H100, November 2026" in text
+    assert "not tested: no device here" in text
+    assert "this machine's processor 12.3" in text
     assert broken_rules(tmp_path / "benchmark.pdf") == []
 
 
 def test_a_device_is_judged_where_there_is_one_and_not_tested_elsewhere():
     assert [goal.verdict for goal in device_goals(None)] == [Verdict.NOT_TESTED] * 2
-    assert LAST.simulations == pytest.approx(4e5)
-    fast = DeviceTimes("made up", "", {1024: 4e-6}, 3.0)
+    assert DeviceTimes.read(LAST).simulations == pytest.approx(4e5)
+    fast = DeviceTimes("made up", "2026-11-27", {1024: 4e-6}, 3.0)
     assert [goal.verdict for goal in device_goals(fast)] == [Verdict.PASS, Verdict.FAIL]
     assert device_goals(fast)[0].reached == "750000"
+
+
+def test_figures_of_a_device_are_kept_with_their_date(tmp_path: Path):
+    measured = DeviceTimes("made up", "2026-11-27", {12: 1e-3, 1024: 4e-6}, 3.0, 2.5)
+    measured.write(tmp_path / "last.json")
+    assert DeviceTimes.read(tmp_path / "last.json") == measured
+
+
+@pytest.mark.slow
+def test_a_search_from_many_starts_is_timed():
+    assert 0.0 < search_seconds(starts=3, iterations=2) < 300.0

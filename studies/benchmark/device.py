@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from bayesid import Posterior
+from bayesid._io.files import write_json
 from bayesid._math.device import device
+from bayesid.design import DOptimal, Search
+from bayesid.design.trajectory_search import optimise
 from bayesid.inference import identify
 from bayesid.report import Document
 from bayesid.report.numbers import format_number
+from studies.common import mission
 from studies.common.report_parts import columns
 from studies.common.study import Goal, Verdict
 
@@ -22,24 +29,36 @@ BATCHES = (12, 1024, 8192)  # numbers of points per call
 SIMULATIONS = 500_000.0  # wanted simulations of 120 s per second
 SECONDS = 2.0  # largest wanted time of an identification of the base to `SAMPLES` effective samples, compiled [s]
 SAMPLES = 4000.0  # its effective samples
+STARTS, ITERATIONS = 24, 10  # descents of the search for manoeuvres, and most iterations of each
 REPEATS = 5  # times that a call is measured, the shortest counts
 
 
 class DeviceTimes(NamedTuple):
-    """What one device takes for the posterior of three recordings of 120 s."""
+    """What one device takes for the posterior of three recordings of 120 s, and for a search for manoeuvres."""
 
     name: str  # of the device
-    date: str  # when it was measured, empty for now
+    date: str  # when it was measured
     per_point: dict[int, float]  # time of a point by the number of points per call [s]
     identification: float | None  # time of an identification to `SAMPLES` effective samples, None if not measured [s]
+    search: float | None = None  # time of `search_seconds`, None if not measured [s]
 
     @property
     def simulations(self) -> float:
         """Largest number of simulations per second; a point has three of them."""
         return 3.0 / min(self.per_point.values())
 
+    @classmethod
+    def read(cls, file: Path) -> DeviceTimes:
+        """Read what `write` left."""
+        content = json.loads(file.read_text(encoding="utf-8"))
+        return cls(**{**content, "per_point": {int(key): value for key, value in content["per_point"].items()}})
 
-LAST = DeviceTimes("NVIDIA H100", "November 2026", {12: 955e-6, 1024: 18e-6, 8192: 7.5e-6}, None)
+    def write(self, file: Path) -> None:
+        """Write the figures with their date, for machines without such a device."""
+        write_json(file, self._asdict())
+
+
+LAST = Path(__file__).with_name("last_device.json")
 """Figures of the last device that was there; 65,536 points in one call ran out of its 80 GB."""
 
 
@@ -59,7 +78,24 @@ def measured_on_device(posterior: Posterior, seed: int = 0) -> DeviceTimes | Non
         per_point[batch] = _shortest(partial(posterior.log_density, z)) / batch
     identify(posterior, seed, effective_samples=SAMPLES)
     seconds = _shortest(lambda: identify(posterior, seed + 1, effective_samples=SAMPLES), 1)
-    return DeviceTimes(jax.devices()[0].device_kind, "", per_point, seconds)
+    today = f"{datetime.now(UTC):%Y-%m-%d}"
+    return DeviceTimes(jax.devices()[0].device_kind, today, per_point, seconds, search_seconds(seed))
+
+
+def search_seconds(seed: int = 0, starts: int = STARTS, iterations: int = ITERATIONS) -> float:
+    """Return the time of a search for the d-optimal manoeuvre of ETS-VII from many starts, compiled [s].
+
+    Parameters
+    ----------
+    seed : int; seed of the starts
+    starts, iterations : int; number of descents, and most iterations of each
+    """
+    criterion = DOptimal()
+    problem = mission.problem(mission.base_unknown(), mission.splines(), criterion)
+    problem.compile()
+    begin = time.perf_counter()
+    optimise(problem, criterion, np.random.default_rng(seed), Search(starts=starts, iterations=iterations))
+    return time.perf_counter() - begin
 
 
 def _shortest(function: Callable[[], object], repeats: int = REPEATS) -> float:
@@ -74,7 +110,7 @@ def _shortest(function: Callable[[], object], repeats: int = REPEATS) -> float:
 
 def device_goals(measured: DeviceTimes | None) -> list[Goal]:
     """Return the goals of a device, not tested where there is none."""
-    last = measured or LAST
+    last = measured or DeviceTimes.read(LAST)
     when = "" if measured else f" on the last one, {last.name}, {last.date}"
     taken = "not measured" if last.identification is None else f"{last.identification:.2g} s"
     fast = measured and measured.simulations >= SIMULATIONS
@@ -94,7 +130,7 @@ def device_goals(measured: DeviceTimes | None) -> list[Goal]:
     ]
 
 
-def add_device(document: Document, measured: DeviceTimes | None, evaluation: float) -> None:
+def add_device(document: Document, measured: DeviceTimes | None, evaluation: float, search: float | None) -> None:
     """Add the section on devices.
 
     Parameters
@@ -102,8 +138,9 @@ def add_device(document: Document, measured: DeviceTimes | None, evaluation: flo
     document : Document
     measured : DeviceTimes or None
     evaluation : float; time of a simulation of one recording on this machine's processor [s]
+    search : float or None; time of `search_seconds` on this machine's processor, None if not measured [s]
     """
-    last = measured or LAST
+    last = measured or DeviceTimes.read(LAST)
     document.section("On another device")
     if measured is None:
         document.paragraph(
@@ -121,4 +158,15 @@ def add_device(document: Document, measured: DeviceTimes | None, evaluation: flo
         rows,
         f"Points of three recordings of 120 s on {last.name}, and three of one recording on this machine.",
         columns("lrr"),
+    )
+    absent = "not tested: no device here" if measured is None else "not measured"
+    document.table(
+        ["search for manoeuvres", "time [s]"],
+        [
+            [f"{last.name}, {last.date}", absent if last.search is None else format_number(last.search, 3)],
+            ["this machine's processor", "not measured" if search is None else format_number(search, 3)],
+        ],
+        f"d-optimal manoeuvre of ETS-VII, 120 s, 48 free numbers: {STARTS} starts, at most {ITERATIONS} iterations "
+        "from each, compiled.",
+        columns("lr"),
     )

@@ -195,7 +195,7 @@ def _samples(document: Document, result: Result) -> None:
 
 
 def _device(document: Document, result: Result) -> None:
-    add_device(document, result.device, float(np.median([run.evaluation for run in result.runs])))
+    add_device(document, result.device, float(np.median([run.evaluation for run in result.runs])), result.search)
 
 
 def _cost(number: int, moves: str, evaluations: int, effective: float, seconds: float) -> list[str]:

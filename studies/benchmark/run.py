@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import emcee
+import jax
 import numpy as np
 from emcee.autocorr import integrated_time
 
@@ -30,7 +31,7 @@ from bayesid.design.design_result import sample_times
 from bayesid.inference import Chains, LogCholeskyParameterisation, identify
 from bayesid.inference.predicted_readings import integration_error_at, simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
-from studies.benchmark.device import DeviceTimes, measured_on_device
+from studies.benchmark.device import LAST, DeviceTimes, measured_on_device, search_seconds
 from studies.common.ets7 import INTERVAL, RADIUS, ets7
 from studies.common.study import show
 from studies.truth import stepwise
@@ -290,6 +291,7 @@ class Result(NamedTuple):
     runs: list[Benchmark]
     full: bool
     device: DeviceTimes | None = None
+    search: float | None = None  # time of a search for manoeuvres on the processor [s]
 
 
 def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = show) -> Result:
@@ -305,7 +307,11 @@ def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = 
     for number in range(RUNS):
         progress(f"run {number + 1} of {RUNS}")
         results.append(_measured(full=full, seed=seed + number))
-    return Result(results, full, measured_on_device(posterior_of(ets7(), recordings=3), seed))
+    measured = measured_on_device(posterior_of(ets7(), recordings=3), seed)
+    if measured is not None:
+        measured.write(LAST)
+    with jax.default_device(jax.devices("cpu")[0]):
+        return Result(results, full, measured, search_seconds(seed) if full else None)
 
 
 def _measured(*, full: bool, seed: int) -> Benchmark:
