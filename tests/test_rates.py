@@ -62,5 +62,4 @@ def test_bodies_are_as_well_known_at_any_rate():
     readings = flown()
     (slow, sd), (fast, other) = (posterior_at(readings, rate) for rate in (10.0, FINE))
     assert (np.abs(fast - slow) / sd)[BODIES].max() < 0.1
-    # samples at an instant and means over 0.1 s tell different things of what joints do within that time
-    np.testing.assert_allclose(other[BODIES], sd[BODIES], rtol=0.03)
+    np.testing.assert_allclose(other[BODIES], sd[BODIES], rtol=0.005)

@@ -31,6 +31,11 @@ WINDOWS = (0, 2, 4, 8, 16, 32)
 TOLERANCE = 2e-4
 """Change of log standard deviation per scalar below which a longer window does not justify its cost."""
 
+SLOW = 0.01
+"""Relative change of the information on a constant of any channel below which the same holds.
+
+What is learnt of bodies changes slowly, and sees the noise's density at low frequency, to which many lags add.
+"""
 
 LARGEST = 4_000_000
 """Number of entries of the covariances that are factorised together."""
@@ -211,10 +216,17 @@ def _shortest(noise: SampleNoise, outputs: list[tuple[int, list[_Output]]]) -> W
         if window > available:
             break
         longer = _whiten(noise, outputs, window)
-        if abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1):
+        settled = abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1)
+        before, after = _of_constants(best), _of_constants(longer)
+        if settled and (np.abs(after - before) <= SLOW * before).all():
             break
         best = longer
     return best
+
+
+def _of_constants(whitening: Whitening) -> Floats:
+    """Return the information on a constant of each channel, (C,)."""
+    return np.asarray((whitening.weights.sum(axis=2) ** 2).sum(axis=(0, 1)))
 
 
 class _Output(NamedTuple):
