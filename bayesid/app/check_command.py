@@ -43,7 +43,7 @@ def run(file: StudyFile, output: Output, progress: Progress) -> Iterator[str]:
         origin = report_origin(study, "check", None, output=output)
         said = convention_lines(result.conventions)
         file = folder / "report.pdf"
-        check_report(posterior, result.recordings, study.title, file, conventions=said, origin=origin)
+        check_report(posterior, result.recordings, study.title, file, conventions=result.conventions, origin=origin)
     yield from said
     if said:
         yield remedy_sentence(study.file)

@@ -11,7 +11,9 @@ from bayesid._io.words import counted
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.recording_check import RecordingCheck
+from bayesid.recording.convention import Convention
 from bayesid.report import figures
+from bayesid.report.convention_report import add_conventions
 from bayesid.report.document import Document
 from bayesid.report.numbers import format_fixed, format_number, format_unit
 
@@ -26,7 +28,7 @@ def check_report(
     title: str,
     file: Path,
     *,
-    conventions: Sequence[str] = (),
+    conventions: Sequence[Convention] = (),
     origin: str = "",
 ) -> None:
     """Write the report of a check as PDF, whole or not at all.
@@ -39,8 +41,8 @@ def check_report(
     title : str
         Title of the study.
     file : path
-    conventions : sequence of str, optional
-        Sentences on wrong conventions.
+    conventions : sequence of Convention, optional
+        Wrong ones.
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
@@ -52,8 +54,12 @@ def check_report(
         f"{counted(posterior.size, 'unknown')}. The integration step is {posterior.step:g} s. Nothing was identified: "
         "simulated values are those of the robot as given."
     )
-    remarks = [*conventions, *(f"{check.name}: {warning}" for check in checks for warning in check.warnings)]
-    document.items(remarks or ["Nothing conspicuous."])
+    remarks = [f"{check.name}: {warning}" for check in checks for warning in check.warnings]
+    if remarks or not conventions:
+        document.items(remarks or ["Nothing conspicuous."])
+    if conventions:
+        add_conventions(document, conventions)
+        document.section("Robot")
     robot = posterior.model.robot
     time = posterior.manoeuvres[0].recording.time
     if robot.joints:

@@ -11,7 +11,7 @@ from bayesid.recording.convention import Convention, in_one_line
 from bayesid.report.document import Document
 from bayesid.report.numbers import format_probability
 
-__all__ = ["convention_report", "convention_verdict"]
+__all__ = ["add_conventions", "convention_report", "convention_verdict"]
 
 CERTAIN = 0.9  # probability from which a convention is named without alternatives
 
@@ -57,13 +57,26 @@ def convention_report(conventions: Sequence[Convention], title: str, file: Path,
     """
     document = Document(title, "Diagnosis")
     document.foot(origin)
+    add_conventions(document, conventions)
+    document.paragraph("Causes in the simulation are not looked for before.")
+    document.write(file)
+
+
+def add_conventions(document: Document, conventions: Sequence[Convention]) -> None:
+    """Add a section on wrong conventions and their remedies.
+
+    Parameters
+    ----------
+    document : Document
+    conventions : sequence of Convention
+    """
     document.section("Wrong conventions")
     document.paragraph(
-        "The recordings contradict what the study says of them, and follow the simulation once it is put right. Causes "
-        "in the simulation are not looked for before. The lines of the table put the study right; `bayesid init --fix` "
-        "writes them."
+        "The recordings contradict what the study says of them, and follow the simulation once it is put right. The "
+        "lines of the table put the study right; bayesid init --fix writes them."
     )
-    document.items([convention.text for convention in conventions])
+    # with a minus sign in place of the hyphen, after which a line may end
+    document.items([convention.text.replace(" -", " \N{MINUS SIGN}") for convention in conventions])
     document.table(
         ["convention", "probability:", "remedy in the study"],
         [
@@ -73,4 +86,3 @@ def convention_report(conventions: Sequence[Convention], title: str, file: Path,
         "Wrong conventions with their remedies. Probabilities weigh them by the balance of momentum against each other "
         "and against something generic that explains nothing in particular.",
     )
-    document.write(file)

@@ -19,7 +19,8 @@ MOVES = 1e-2  # range of a joint's motion from which its sign can matter [rad or
 ZEROS = np.deg2rad([-150.0, -120.0, -90.0, -60.0, -45.0, -30.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0])
 
 STEPS = np.deg2rad([15.0, 5.0, 1.5, 0.5])  # refinement of a zero
-ALIKE = np.deg2rad(5.0)  # difference of zeros that are not told apart
+SLIDES = np.array([-0.8, -0.4, -0.2, -0.1, 0.1, 0.2, 0.4, 0.8])  # zeros of prismatic joints [m]
+ALIKE, ALIKE_SLIDES = np.deg2rad(5.0), 0.03  # differences of zeros that are not told apart [rad, m]
 
 
 @MistakeFamily.register
@@ -50,20 +51,29 @@ def _other_way(index: int, name: str, share: float) -> Mistake:
 
 @MistakeFamily.register
 class JointZero(MistakeFamily):
-    """A revolute joint whose angle counts from another zero."""
+    """A joint that counts from another zero."""
 
     title = "zeros of joints"
 
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
-        """Yield usual zeros of every revolute joint, which the search refines."""
+        """Yield usual zeros of every joint, which the search refines."""
         for index, joint in enumerate(model.robot.joints):
-            for offset in ZEROS if joint.unit == "rad" else ():
-                yield _zero_of(index, joint.name, float(offset), 1.0 / len(ZEROS) / len(model.robot.joints))
+            offsets = ZEROS if joint.unit == "rad" else SLIDES
+            for offset in offsets:
+                share = 1.0 / len(offsets) / len(model.robot.joints)
+                yield _zero_of(index, joint.name, float(offset), share, turns=joint.unit == "rad")
 
 
-def _zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
-    """Return the mistake that a joint's angle lacks an offset [rad]."""
-    offset = float(np.pi - (np.pi - offset) % (2.0 * np.pi))  # within half a turn
+def _zero_of(index: int, name: str, offset: float, share: float, *, turns: bool) -> Mistake:
+    """Return the mistake that a joint's position lacks an offset [rad or m]."""
+    if turns:
+        offset = float(np.pi - (np.pi - offset) % (2.0 * np.pi))  # within half a turn
+    added = f"{np.rad2deg(offset):.3g} degrees to its angle" if turns else f"{offset:.3g} m to its position"
+
+    def nearby(level: int) -> tuple[Mistake, ...]:
+        step = STEPS[level] if turns else 0.25 * abs(offset) * 0.5**level
+        return tuple(_zero_of(index, name, offset + sign * step, share, turns=turns) for sign in (1.0, -1.0))
+
     return Mistake(
         f"convention:zero:{name}",
         name,
@@ -71,12 +81,10 @@ def _zero_of(index: int, name: str, offset: float, share: float) -> Mistake:
         3,
         lambda seen: _counted(seen, index, 1.0, offset),
         lambda seen: _stated(_counted(seen, index, 1.0, offset), name, "offset"),
-        lambda seen: f"Joint {name} counts from another zero: add {np.rad2deg(offset):.3g} degrees to its angle.",
+        lambda seen: f"Joint {name} counts from another zero: add {added}.",
         share,
-        nearby=lambda level: tuple(
-            _zero_of(index, name, offset + step, share) for step in (STEPS[level], -STEPS[level])
-        ),
-        value=offset / ALIKE,
+        nearby=nearby,
+        value=offset / (ALIKE if turns else ALIKE_SLIDES),
     )
 
 
