@@ -189,7 +189,7 @@ def test_recordings_without_motion_are_refused_and_those_with_a_little_are_not(s
 
     def stilled(columns: Columns) -> Columns:
         return {
-            name: values if name == "time" else 1e-5 * draw.standard_normal(len(values))
+            name: values if name.startswith(("time", "attitude")) else 1e-5 * draw.standard_normal(len(values))
             for name, values in columns.items()
         }
 
@@ -203,7 +203,7 @@ def test_the_stated_attitudes_of_all_recordings_are_put_right(tmp_path: Path) ->
     options = {"manoeuvres": Manoeuvres(count=3, duration=40.0), "sensors": Sensors(attitude_period=2.0)}
     file = write_study(tmp_path, SERVICER3, np.random.default_rng(5), **options).file
     right = tomllib.loads(file.read_text())["recordings"]
-    swapped = [f"[[recordings]]\nattitude = {list(np.roll(section['attitude'], 1))}" for section in right]
+    swapped = [f"[[recordings]]\nattitude = {np.roll(section['attitude'], 1).tolist()}" for section in right]
     file.write_text(with_remedies(file.read_text(), ["\n".join(swapped)]))
     (convention,) = conventions_of(Study.load(file))
     assert (convention.name, convention.channel) == ("convention:order:attitude", "recordings.attitude")

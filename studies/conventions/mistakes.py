@@ -189,7 +189,6 @@ MISTAKES: dict[str, Blunder] = {
         0.05,  # they are taken to rest before
     ),
     "rates in counts": Blunder(edited(_times("rate.", 9000.0)), ("convention:unit:rate",), 1.0),
-    "accelerations in counts": Blunder(edited(_times("accel.", 3.0e5)), ("convention:unit:accel",), 1.0),
     "a sign and a unit": Blunder(
         edited(_both(_times("position.joint2", -1.0), _times("accel.", 1e3 / GRAVITY))),
         ("convention:unit:accel", "convention:sign:joint2"),
