@@ -1,10 +1,13 @@
 """One flight recorded at 10 and at 1,000 Hz with noise per root hertz alike."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
+from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -22,13 +25,14 @@ FINE = 1000.0  # rate of the fast recording; the noise of the slow one is the me
 DENSITY = 1e-5  # noise of the sensors per sample at 2 Hz
 ENCODERS = 1e-6  # and of the encoders
 BODIES = slice(0, 10)
+FIRST_RATE = (0.01, -0.02, 0.015)
 
 
 def flown() -> dict[str, np.ndarray]:
     """Return what sensors and encoders read without noise at the fine rate, by MuJoCo."""
     motion = mj.smooth_motion(2, END, seed=11, amplitude=0.3, frequencies=(0.05, 0.08), ramp=8.0)
     time = np.arange(0.0, END + 0.001, 0.02)
-    truth = mj.TruthModel(PLANAR, accel_position=POINT).run(motion, time, rate0=(0.01, -0.02, 0.015), step=0.02)
+    truth = mj.TruthModel(PLANAR, accel_position=POINT).run(motion, time, rate0=FIRST_RATE, step=0.02)
     fine = np.arange(0.0, END, 1.0 / FINE)
     curves = {f"position.joint{index + 1}": truth.position[:, index] for index in range(2)}
     curves |= {f"rate.{axis}": truth.rate[:, index] for index, axis in enumerate("xyz")}
@@ -36,8 +40,17 @@ def flown() -> dict[str, np.ndarray]:
     return {name: CubicSpline(time, values)(fine) for name, values in curves.items()}
 
 
-def posterior_at(readings: dict[str, np.ndarray], rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and standard deviation of the unknowns at a rate by Laplace's approximation."""
+class Fitted(NamedTuple):
+    """Mode, Laplace's deviations (n,), rate of the base at time 0 and what the encoders leave open of it (3,)."""
+
+    mode: np.ndarray
+    sd: np.ndarray
+    rate: np.ndarray
+    rate_sd: np.ndarray
+
+
+def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
+    """Return what is learnt at a rate, by Laplace's approximation."""
     rng, fine, noise = np.random.default_rng(3), np.arange(0.0, END, 1.0 / FINE), float(np.sqrt(rate / 2.0))
     count = round(FINE / rate)
     time, channels = fine.reshape(-1, count).mean(axis=1), {}
@@ -55,11 +68,17 @@ def posterior_at(readings: dict[str, np.ndarray], rate: float) -> tuple[np.ndarr
     start = posterior.starting_point()
     mode = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, 1e-9, 200).x
     slopes = posterior.jacobian(mode)
-    return mode, np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    sd = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    first = np.asarray(posterior.unknowns.values_at(mode).rate)[0]
+    return Fitted(mode, sd, first, np.hypot(posterior.model.rate_sigma * sd[-3:], first_rate_sd(robot, moved)))
 
 
 def test_bodies_are_as_well_known_at_any_rate():
     readings = flown()
-    (slow, sd), (fast, other) = (posterior_at(readings, rate) for rate in (10.0, FINE))
-    assert (np.abs(fast - slow) / sd)[BODIES].max() < 0.1
-    np.testing.assert_allclose(other[BODIES], sd[BODIES], rtol=0.005)
+    slow, fast = (posterior_at(readings, rate) for rate in (10.0, FINE))
+    assert (np.abs(fast.mode - slow.mode) / slow.sd)[BODIES].max() < 0.1
+    np.testing.assert_allclose(fast.sd[BODIES], slow.sd[BODIES], rtol=0.005)
+    # the rate at time 0 is no better known than the joints' speeds there, which fits take for true
+    assert (np.abs(fast.rate - slow.rate) / slow.rate_sd).max() < 0.1
+    for fitted in (slow, fast):
+        assert (np.abs(fitted.rate - FIRST_RATE) / fitted.rate_sd).max() < 4.0

@@ -21,6 +21,7 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.small_matrices import cross, rotation, tilted
+from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.robot.composite_tables import ENTRIES, WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
@@ -31,7 +32,7 @@ from bayesid.simulation.joint_torques import BaseMotion, Beyond, beyond_joints, 
 from bayesid.simulation.sensors import Channels, Sensed, Sensor, SensorKind
 from bayesid.simulation.time_grid import lengthened, rounded
 
-__all__ = ["SampledMotion", "joint_sensitivity"]
+__all__ = ["SampledMotion", "first_rate_sd", "joint_sensitivity"]
 
 STEP = 1e-6
 """Step of the finite differences in joint position, velocity and acceleration [rad or m, per s, per s2]."""
@@ -123,6 +124,26 @@ def joint_sensitivity(
             spun[:, ENTRIES[entry]] += STEP * wheel.inertia * np.asarray(wheel.axis)
             result[number, derivative] = change(_read(kinds, mounted, environment, spun, beyond, momentum, quaternion))
     return result
+
+
+def first_rate_sd(robot: Robot, motion: MeasuredMotion) -> Floats:
+    """Return what errors of the smoothed joint speeds leave open of the base's rate at time 0, (3,) [rad/s].
+
+    Later readings determine the momentum, so that joints that seem faster at time 0 make the base seem slower there;
+    fits take the smoothed speeds for true.
+
+    Parameters
+    ----------
+    robot : Robot
+    motion : MeasuredMotion
+    """
+    first, count = np.zeros(1), len(robot.joints)
+    if not count:
+        return np.zeros(3)
+    position = np.repeat(motion.evaluate(first).position, count, axis=0)
+    rows = composite_rows(robot, kinematics(robot, JointState(position, np.eye(count), np.zeros((count, count)))))
+    slopes = np.stack([np.asarray(body.inverse @ body.spin) for body in map(composite, rows)])
+    return np.asarray(np.sqrt(motion.lag_covariance(first, 0)[:, 0, 0, 1, 1] @ slopes**2))
 
 
 class _Reading(NamedTuple):

@@ -33,6 +33,7 @@ from bayesid.inference.body_quantities import (
     reported_effect,
 )
 from bayesid.inference.collapsed_proposal import collapsed_proposal
+from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.ensemble import Chains
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
@@ -43,6 +44,7 @@ from bayesid.inference.posterior_as_prior import identified_robot
 from bayesid.inference.posterior_file import to_arviz
 from bayesid.inference.predicted_readings import SensorFit, TorqueFit, integration_error_at, sensor_fits, torque_fits
 from bayesid.inference.sampler import Emcee, Sampler, SamplingTarget, chains_of
+from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
 
@@ -190,7 +192,7 @@ class Identification(ShortForm):
 
     @cached_property
     def starts(self) -> tuple[StartState, ...]:
-        """Unknown initial rates and rotations of the base."""
+        """Unknown initial rates and rotations of the base; rates with what the encoders' noise leaves open of them."""
         unknowns, values = self.posterior.unknowns, self.posterior.unknowns.values_of(self.chains.flat)
         states = []
         for index, manoeuvre in enumerate(self.posterior.manoeuvres):
@@ -201,6 +203,8 @@ class Identification(ShortForm):
                 if sigma > 0.0:
                     drawn = np.asarray(draws)[:, index]
                     mean, sd = drawn.mean(axis=0), drawn.std(axis=0, ddof=1)
+                    if name == "initial rate" and isinstance(manoeuvre.motion, MeasuredMotion):
+                        sd = np.hypot(sd, first_rate_sd(self.robot, manoeuvre.motion))
                     states.append(StartState(manoeuvre.recording.name, name, unit, float(sigma), mean, sd))
         return tuple(states)
 
