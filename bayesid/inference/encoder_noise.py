@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.small_matrices import cross, rotation, tilted
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -126,6 +127,7 @@ def joint_sensitivity(
     return result
 
 
+@in_double_precision
 def first_rate_sd(robot: Robot, motion: MeasuredMotion) -> Floats:
     """Return what errors of the smoothed joint speeds leave open of the base's rate at time 0, (3,) [rad/s].
 

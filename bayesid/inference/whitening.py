@@ -216,9 +216,9 @@ def _shortest(noise: SampleNoise, outputs: list[tuple[int, list[_Output]]]) -> W
         if window > available:
             break
         longer = _whiten(noise, outputs, window)
-        settled = abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1)
+        alike = abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1)
         before, after = _of_constants(best), _of_constants(longer)
-        if settled and (np.abs(after - before) <= SLOW * before).all():
+        if alike and (np.abs(after - before) <= SLOW * before).all():
             break
         best = longer
     return best
