@@ -44,6 +44,13 @@ def test_a_command_has_the_defaults_of_its_function(name):
     assert {key: command[key].default for key in shared} == {key: function[key].default for key in shared}
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_is_no_study_is_an_error_that_says_so(name, tmp_path):
+    more = (tmp_path / "loop",) if name == "loop" else ()
+    with pytest.raises(bayesid.InputError, match="a dict is no study"):
+        getattr(bayesid, name)({"robot": "robot.urdf"}, *more)
+
+
 @pytest.mark.parametrize("name", ["design", "identifiability"])
 def test_a_function_with_the_name_of_a_room_stays_one(name):
     function, room = getattr(bayesid, name), importlib.import_module(f"bayesid.{name}")
