@@ -72,6 +72,21 @@ def test_a_result_is_shown_by_a_few_lines(result):
     assert all(sentence in text for sentence in result.disagreements)
 
 
+def test_what_a_model_is_made_of_is_shown_by_its_names_and_not_by_its_numbers(planar_case):
+    posterior = planar_case.posterior
+    manoeuvre = posterior.manoeuvres[0]
+    model = posterior.model
+    parts = {"posterior": posterior, "model": model, "robot": model.robot, "manoeuvre": manoeuvre}
+    shown = {name: repr(part) for name, part in parts.items()}
+    assert all(len(text) < 600 for text in shown.values()), shown
+    assert f"{posterior.samples} samples, {posterior.size} unknowns." in shown["posterior"]
+    assert "base base_link, joints joint1, joint2" in shown["robot"]
+    assert f"{shown['robot']}\nSensors: " in shown["model"]
+    assert "Bodies to identify: base_link." in shown["model"]
+    assert shown["manoeuvre"] == repr(manoeuvre.recording)
+    assert f"{len(manoeuvre.recording.time)} samples over" in shown["manoeuvre"]
+
+
 def test_short_forms_are_safe_and_aligned():
     class Shown(ShortForm):
         def summary(self) -> Summary:

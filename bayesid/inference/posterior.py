@@ -14,6 +14,8 @@ from jax import Array
 from scipy.special import ndtri
 
 from bayesid._io.errors import InputError
+from bayesid._io.short_form import ShortForm, Summary
+from bayesid._io.words import counted
 from bayesid._math.arrays import Floats
 from bayesid._math.device import device
 from bayesid._math.on_device import on_device
@@ -38,8 +40,8 @@ COPIES = 4.0
 """Number of arrays of the size of the composite body's tables that XLA keeps at a time; on a processor it plans 3.6."""
 
 
-@dataclass(frozen=True)
-class Posterior:
+@dataclass(frozen=True, repr=False)
+class Posterior(ShortForm):
     """Posterior of the unknowns of a model given recorded manoeuvres; immutable.
 
     The coordinates ``z`` have a standard-normal prior (`Unknowns`). `log_density`, `log_prior`, `log_likelihood`,
@@ -61,6 +63,12 @@ class Posterior:
     data: Data
     unknowns: Unknowns
     flat_prior: bool = False
+
+    def summary(self) -> Summary:
+        """Return what is known of the model, and the sizes of the problem."""
+        counts = (len(self.manoeuvres), "recording"), (self.samples, "sample"), (self.size, "unknown")
+        sizes = ", ".join(counted(number, name) for number, name in counts)
+        return Summary([*self.model.summary().sentences, f"{sizes}."])
 
     @classmethod
     def of(

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid._math.arrays import Floats
 from bayesid.recording.convention import Convention, ConventionError
 from bayesid.recording.recorded_as import RecordedAs
@@ -38,8 +39,8 @@ LARGE = (
 NORM_TOLERANCE = 1e-3  # deviation of a quaternion's norm from one above which it is taken for an error
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(ShortForm):
     """Measured data of one manoeuvre, with T time stamps.
 
     Parameters
@@ -67,6 +68,11 @@ class Recording:
     time: Array
     channels: Mapping[str, Array]
     recorded_as: RecordedAs = field(default_factory=RecordedAs)
+
+    def summary(self) -> Summary:
+        """Return number and duration of the samples, and the columns."""
+        samples = f"{self.name}: {len(self.time)} samples over {self.time[-1]:.4g} s"
+        return Summary([f"{samples} of {', '.join(self.channels)}."])
 
     def __post_init__(self) -> None:
         channels = {column: np.array(values, dtype=float) for column, values in self.channels.items()}

@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import write_text
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid._math.arrays import Floats
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
@@ -71,8 +72,8 @@ class Load:
     inertial: InertialParameters
 
 
-@dataclass(frozen=True)
-class Robot:
+@dataclass(frozen=True, repr=False)
+class Robot(ShortForm):
     """A free-flying robot.
 
     Build one with `Robot.from_urdf`; every change returns a new robot.
@@ -89,6 +90,11 @@ class Robot:
     model: pin.Model
     remarks: tuple[str, ...] = ()  #: what the file left open or got wrong, and how it was read
     wheels: tuple[Wheel, ...] = ()  #: reaction wheels whose speed is recorded; at rest they are part of the base
+
+    def summary(self) -> Summary:
+        """Return base, joints and mass."""
+        joints = ", ".join(joint.name for joint in self.joints) or "none"
+        return Summary([f"{self.name}: base {self.base}, joints {joints}, {self.mass:.6g} kg.", *self.remarks])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content for another process, to which a read-only mapping cannot be sent."""

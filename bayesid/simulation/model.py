@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.short_form import ShortForm, Summary
 from bayesid._math.arrays import Floats
 from bayesid.recording.blocks import BLOCKS_PER_SECOND
 from bayesid.recording.joint_motion import Motion
@@ -26,8 +27,8 @@ RATE_SIGMA = 0.1
 """Default prior standard deviation of an unknown initial rate [rad/s], wide for any spacecraft."""
 
 
-@dataclass(frozen=True)
-class Manoeuvre:
+@dataclass(frozen=True, repr=False)
+class Manoeuvre(ShortForm):
     """A recorded (or planned) manoeuvre.
 
     Parameters
@@ -53,9 +54,13 @@ class Manoeuvre:
     argument_of_latitude: float = 0.0
     blocks_per_second: float = BLOCKS_PER_SECOND
 
+    def summary(self) -> Summary:
+        """Return what was recorded."""
+        return self.recording.summary()
 
-@dataclass(frozen=True)
-class Model:
+
+@dataclass(frozen=True, repr=False)
+class Model(ShortForm):
     """Robot with its sensors, the effects of its simulation and the priors of its unknown bodies.
 
     Parameters
@@ -89,6 +94,14 @@ class Model:
     mixing: Mixing | None = None
     torque: TorqueSensor | None = None
     speed_errors: bool | None = None
+
+    def summary(self) -> Summary:
+        """Return robot, sensors, bodies to identify and effects."""
+        kinds = [sensor.kind.value for sensor in self.sensors]
+        names = (kinds, [prior.name for prior in self.bodies], [effect.label for effect in self.effects])
+        sensors, bodies, effects = (", ".join(part) or "none" for part in names)
+        known = f"Sensors: {sensors}. Bodies to identify: {bodies}. Effects: {effects}."
+        return Summary([*self.robot.summary().sentences, known])
 
     def __post_init__(self) -> None:
         if not self.sensors:

@@ -112,9 +112,14 @@ class LoopResult(ShortForm):
     @cached_property
     def steps(self) -> tuple[LoopStep, ...]:
         """Steps so far."""
-        stages = ("plan", "recording", "identification")
         return tuple(
-            LoopStep(step["step"], *(self.history.path(step["step"], stage) for stage in stages), step)
+            LoopStep(
+                number=step["step"],
+                plan=self.history.path(step["step"], "plan"),
+                recording=self.history.path(step["step"], "recording"),
+                posterior=self.history.path(step["step"], "identification"),
+                entry=step,
+            )
             for step in self.history.steps
         )
 
