@@ -39,7 +39,8 @@ class ReadingUnits(MistakeFamily):
     def members(self, model: Model, readings: ReadingsOnGrid) -> Iterator[Mistake]:
         """Yield the units of each sensor, and for rates that of turns between attitudes where it is none of them."""
         for kind in readings.sensors:
-            units = {unit: factor for unit, factor in UNITS[kind.value].items() if factor != 1.0}
+            named = {factor: unit for unit, factor in reversed(UNITS[kind.value].items()) if factor != 1.0}
+            units = {unit: factor for factor, unit in named.items()}  # degrees per hour are arcseconds per second
             rest = (1.0 - sum(USUAL.get(unit, 0.0) for unit in units)) / len(units)
             for unit, factor in units.items():
                 yield in_unit(kind, unit, factor, 0.5 * USUAL.get(unit, rest))
