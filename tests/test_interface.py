@@ -51,6 +51,14 @@ def test_what_is_no_study_is_an_error_that_says_so(name, tmp_path):
         getattr(bayesid, name)({"robot": "robot.urdf"}, *more)
 
 
+def test_what_reads_a_study_takes_its_path(study):
+    model = bayesid.load_model(study)
+    assert repr(model) == repr(bayesid.load_model(bayesid.Study.load(study)))
+    (manoeuvre,) = bayesid.load_manoeuvres(str(study), model.robot)
+    assert repr(manoeuvre.recording) in repr(bayesid.load_posterior(str(study)).manoeuvres)
+    assert bayesid.load_problem(study).plan.model.robot.name == model.robot.name
+
+
 @pytest.mark.parametrize("name", ["design", "identifiability"])
 def test_a_function_with_the_name_of_a_room_stays_one(name):
     function, room = getattr(bayesid, name), importlib.import_module(f"bayesid.{name}")

@@ -41,14 +41,15 @@ FUNCTIONS = 8  # default number of free functions of every joint
 BASE_AT_START = ("attitude", "attitude_sigma", "argument_of_latitude")
 
 
-def load_problem(study: Study) -> Problem:
-    """Return the design problem of a study, which needs no recordings.
+def load_problem(study: Study | str | Path) -> Problem:
+    """Return the design problem of a study, or of its file, which needs no recordings.
 
     Raises
     ------
     InputError
         If the study does not define a design problem; the message names file, place, value and remedy.
     """
+    study = Study.of(study)
     section, model = study.design or DesignSection(), load_model(study).without_torque
     try:
         model = _with_rivals(model, section)

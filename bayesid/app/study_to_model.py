@@ -58,12 +58,12 @@ FARTHEST = 10.0
 CHANGE_SEED = 0  # seed of the draws of an uncertain mass-property change, so that a study always has the same prior
 
 
-def load_posterior(study: Study, window: int | None = None, progress: Progress = silent) -> Posterior:
+def load_posterior(study: Study | str | Path, window: int | None = None, progress: Progress = silent) -> Posterior:
     """Read all files that a study names, and return its posterior.
 
     Parameters
     ----------
-    study : Study
+    study : Study or path
     window : int, optional
         As for `Posterior.of`.
     progress : Progress, optional
@@ -74,6 +74,7 @@ def load_posterior(study: Study, window: int | None = None, progress: Progress =
     InputError
         If a file is absent or a rule is broken; the message names file, place, value and remedy.
     """
+    study = Study.of(study)
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot, progress)
     try:
@@ -128,8 +129,9 @@ def _carried(study: Study, robot: Robot) -> JointPrior | None:
         raise error.within(file=section.posterior) from None
 
 
-def load_model(study: Study) -> Model:
-    """Return the model of a study, after running its plugins."""
+def load_model(study: Study | str | Path) -> Model:
+    """Return the model of a study, or of its file, after running its plugins."""
+    study = Study.of(study)
     for plugin in study.model.plugins:
         run_user_file(Path(plugin), "model.plugins", "Correct the path of the plugin")
     robot, carried = _load_robot(study)
@@ -188,16 +190,17 @@ def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tup
     return (*known, *links), carried.mixing(links)
 
 
-def load_manoeuvres(study: Study, robot: Robot, progress: Progress = silent) -> list[Manoeuvre]:
+def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress = silent) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion.
 
     Parameters
     ----------
-    study : Study
+    study : Study or path
     robot : Robot
     progress : Progress, optional
         Receiver of the share that is read.
     """
+    study = Study.of(study)
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     _check_latitudes(study)

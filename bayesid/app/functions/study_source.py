@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_posterior
@@ -19,10 +18,7 @@ StudySource = Study | str | Path
 
 def study_of(source: StudySource) -> Study:
     """Return the study, which is read if a path is given."""
-    if not isinstance(source, (Study, str, Path)):
-        remedy = "Give the path of a study file, a bayesid.Study, or the object that the function's help names"
-        raise InputError(f"a {type(source).__name__} is no study", remedy=remedy)
-    return source if isinstance(source, Study) else Study.load(source)
+    return Study.of(source)
 
 
 def recorded_posterior(

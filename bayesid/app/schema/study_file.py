@@ -75,6 +75,14 @@ class Study(Section):
         return [self.file, self.robot.urdf, self.unknowns.posterior, *self.model.plugins]
 
     @classmethod
+    def of(cls, source: Study | str | Path) -> Study:
+        """Return a study, which is read if a path is given."""
+        if not isinstance(source, (Study, str, Path)):
+            remedy = "Give the path of a study file, a bayesid.Study, or the object that the function's help names"
+            raise InputError(f"a {type(source).__name__} is no study", remedy=remedy)
+        return source if isinstance(source, Study) else cls.load(source)
+
+    @classmethod
     def load(cls, path: str | Path) -> Study:
         """Read and check a study file; its paths are resolved relative to the file's folder.
 
