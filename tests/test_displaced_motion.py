@@ -170,7 +170,12 @@ def played(gap: float, joint: int) -> np.ndarray:
         if abs(there) >= 0.5 * gap:
             there, speed = 0.5 * gap * np.sign(there), 0.0
         place.append(there)
-    curve = make_interp_spline(fine, gaussian_filter1d(np.array(place), 0.1 / 0.02), k=5)
+    return displaced_in_mujoco(model, joint, fine, np.array(place))
+
+
+def displaced_in_mujoco(model: mj.TruthModel, joint: int, times: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Rate and acceleration of a robot one of whose links lies off its joint's position at some times, (T, 6)."""
+    curve = make_interp_spline(times, gaussian_filter1d(place, 0.1 / 0.02), k=5)
 
     def moved(time: float) -> tuple[np.ndarray, ...]:
         state = [part.copy() for part in formula(time)]
@@ -187,7 +192,7 @@ def test_a_link_coasts_across_the_play_of_its_joint():
     """While it does its speed depends on the torque, not on the gap: the time is right for a gap of 1e-3 rad."""
     shown = Recorded()
     without = simulated(shown, mass=HEAVY)
-    with_play = simulated(shown, JointBacklash("joint2"), (1e-3,), mass=HEAVY)
+    with_play = simulated(shown, JointBacklash("joint2"), (1e-3, 0.0, 0.0), mass=HEAVY)
     changed, carried = played(1e-3, 1) - without, with_play - without
     rates = changed[:, :3].ravel(), carried[:, :3].ravel()
     assert np.corrcoef(*rates)[0, 1] > 0.85
@@ -195,3 +200,20 @@ def test_a_link_coasts_across_the_play_of_its_joint():
     lying = np.abs(changed[:, 3:]).max(axis=1) < 5e-5
     assert lying.sum() > 60
     assert np.abs(carried - changed)[lying, :3].max() < 0.1 * np.abs(changed)[lying, :3].max()
+
+
+@pytest.mark.slow
+def test_a_link_with_friction_waits_until_its_joint_has_crossed_the_gap():
+    """The link's place is that of a play operator: it stays where it is while the motor moves within the gap."""
+    carrying = mj.join(link_body(SERVICER, "link3"), mj.Body(HEAVY, COM, INERTIA))
+    model = mj.TruthModel(SERVICER, accel_position=POINT, changed={"link3": carrying})
+    fine, gap = np.arange(0.0, 40.001, 0.02), 1e-3
+    motor = np.array([formula(time)[0][1] for time in fine])
+    link = [motor[0] - 0.5 * gap * np.sign(motor[-1] - motor[0] + motor[len(motor) // 2] - motor[0])]
+    for place in motor[1:]:
+        link.append(np.clip(link[-1], place - 0.5 * gap, place + 0.5 * gap))
+    shown = Recorded()
+    without = simulated(shown, mass=HEAVY)
+    changed = displaced_in_mujoco(model, 1, fine, np.array(link) - motor) - without
+    carried = simulated(shown, JointBacklash("joint2"), (0.0, gap, 0.0), mass=HEAVY) - without
+    assert np.corrcoef(changed[:, :3].ravel(), carried[:, :3].ravel())[0, 1] > 0.95

@@ -11,7 +11,7 @@ found elsewhere (`bayesid.recording.jumps`).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -160,6 +160,20 @@ class SmoothedJoint:
         return replace(
             self, roughness=roughness, log_likelihood=log_likelihood, states=states, factor=factor, chi2=chi2
         )
+
+    def of_course(self, course: Callable[[Floats], Floats]) -> SmoothedJoint:
+        """Return what the smoothing, which is linear in the samples, makes of another course of the position.
+
+        Parameters
+        ----------
+        course : callable
+            Position, velocity and acceleration of the course, (3, n), at some times (n,).
+        """
+        series = tuple(replace(one, value=course(one.time)[one.derivative]) for one in self.series)
+        start = None if self.start is None else float(course(np.zeros(1))[0, 0])
+        other = replace(self, series=series, start=start)
+        problem, sigmas = other._problem
+        return replace(other, states=problem.solve(self.scaled_intensity, sigmas)[1])
 
     def _orders(self, orders: Sequence[int]) -> Sequence[int]:
         return orders if self.roughness is None else (self.order,)

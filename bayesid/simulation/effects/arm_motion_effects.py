@@ -14,7 +14,7 @@ from jax import Array
 from scipy.interpolate import make_interp_spline
 
 from bayesid._math.arrays import Floats, Traceable, namespace
-from bayesid.recording.joint_motion import Motion
+from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, configuration, kinematics
@@ -274,7 +274,7 @@ QUICKEST, SLOWEST = 0.05, 5.0
 """Shortest and longest time of a crossing [s]."""
 
 UNLOADED = 1.0e-3
-"""Torque through a joint relative to its largest below which it presses to neither side."""
+"""Torque through a joint, or its speed, relative to the largest below which it presses to neither side."""
 
 FINE = 20
 """Instants per interval between knots at which the sign of the torque is looked at."""
@@ -282,24 +282,31 @@ FINE = 20
 
 @register
 class JointBacklash(_DisplacedMotion, OnJoint):
-    """Play of a joint: the link lies half the gap off the encoder, on the side that the torque through the joint takes.
+    """Play of a joint: the link lies off the encoder, at one side of a gap, and crosses it now and then.
 
-    The flank that drives the link presses it from behind, so that it lags the way it is accelerated. Where the torque
-    changes its sign the link coasts from one flank to the other; how long that takes follows from the slope of the
-    torque and a gap of `TYPICAL_GAP`; the impact at the end is left out. The torque is that of the robot's bodies,
-    with the centres of the priors for unknown ones.
+    What presses it to a side is one of two things. Without friction it is the torque through the joint: the flank that
+    drives the link presses it from behind, so that it lags the way it is accelerated. Where the torque changes its sign
+    the link coasts from one flank to the other; how long that takes follows from the slope of the torque and a gap of
+    `TYPICAL_GAP`; the impact at the end is left out. The torque is that of the robot's bodies, with the centres of the
+    priors for unknown ones. With friction, such as that of its bearing and cables, the link lags the way it moves.
+    Where the joint turns back, either the encoder moves on evenly and the link waits until it has come across the gap,
+    or the link moves on evenly and the encoder leaps, which is seen as the smoothing of the recording shows it. Of a
+    gear with some friction each has a share.
     """
 
     name = "joint-backlash"
-    summary = "The joint has play: the bodies beyond it shift by the gap where the torque through the joint reverses."
+    summary = (
+        "The joint has play: the bodies beyond it shift by the gap where the torque through the joint reverses or, "
+        "with friction, where the joint turns back."
+    )
     separated_by = (
-        "It jumps where the joint's torque changes its sign, by the same angle however fast the motion is: accelerate "
-        "and brake that joint slowly and fast."
+        "It jumps where the joint's torque changes its sign or the joint turns back, by the same angle however fast "
+        "the motion is: accelerate and brake that joint slowly and fast."
     )
 
     def __init__(self, place: str = "", sigma: float = TYPICAL_GAP) -> None:
         super().__init__(place)
-        self.parameters = (Parameter("gap", "rad", sigma),)
+        self.parameters = tuple(Parameter(name, "rad", sigma) for name in ("coasting", "waiting", "leaping"))
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the unit of its joint's position."""
@@ -317,23 +324,69 @@ class JointBacklash(_DisplacedMotion, OnJoint):
         return (PhysicalBound("rad", LARGEST_GAP, reason),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
-        """Return the displacement of the link per gap, as a central difference."""
+        """Return the displacements of the link per gap of each kind, as central differences."""
         index, state = self.index_in(robot), motion.evaluate(time)
-        side = _side_of_gap(_Deflection(robot, motion, index, float(time[-1])), time)
+        deflection = _Deflection(robot, motion, index, float(time[-1]))
+        first, turns = _reversals(
+            fine := _finely(*deflection.span), np.asarray(motion.evaluate(fine).velocity)[:, index]
+        )
+
+        def leap(at: Floats) -> Floats:
+            return _lagging(at, first, [(turn, QUICKEST) for turn in turns])
+
+        smoothed = motion.joints[index].of_course(leap) if isinstance(motion, MeasuredMotion) else None
+        # the link rests until the motor, which has this acceleration, has crossed the gap
+        waits = [(turn, float(np.clip((2.0 * TYPICAL_GAP / turn.slope) ** 0.5, QUICKEST, SLOWEST))) for turn in turns]
+        sides = (
+            _side_by_torque(deflection, time),
+            _lagging(time, first, waits),
+            leap(time) if smoothed is None else smoothed.evaluate(time),
+        )
         motions = []
-        for sign in (-1.0, 1.0):
-            changed = [np.array(values) for values in state]
-            for derivative in range(3):
-                changed[derivative][:, index] += sign * TYPICAL_GAP * side[derivative]
-            motions.append(kinematics(robot, JointState(*changed)))
-        return _Displaced(motions, np.array([[-0.5, 0.5]]) / TYPICAL_GAP)
+        for side in sides:
+            for sign in (-1.0, 1.0):
+                changed = [np.array(values) for values in state]
+                for derivative in range(3):
+                    changed[derivative][:, index] += sign * TYPICAL_GAP * side[derivative]
+                motions.append(kinematics(robot, JointState(*changed)))
+        return _Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]) / TYPICAL_GAP)
 
     def loads(self, values: Array) -> Array:
-        """Return the gap."""
+        """Return the gaps."""
         return values
 
 
-def _side_of_gap(deflection: _Deflection, time: Floats) -> Floats:
+class _Reversal(NamedTuple):
+    """Change of the sign of a course: when it is zero, its slope there, and the side that it takes, 1 or -1."""
+
+    time: float
+    slope: float
+    side: float
+
+
+def _reversals(times: Floats, course: Floats) -> tuple[float, list[_Reversal]]:
+    """Return the first sign of a course (n,) at some times (n,), and its changes; where it is small it has none."""
+    loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max(initial=0.0))
+    if not len(loaded):
+        return 0.0, []
+    changes = []
+    for before, after in pairwise(loaded):
+        if np.sign(course[after]) != np.sign(course[before]):
+            slope = abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
+            changes.append(_Reversal(times[after] - abs(course[after]) / slope, slope, float(np.sign(course[after]))))
+    return float(np.sign(course[loaded[0]])), changes
+
+
+def _across(time: Floats, crossing: _Reversal, lasts: float, power: int) -> Floats:
+    """Return the way across the gap, from 0 to 1 in some time, with two derivatives at the times (T,): shape (3, T)."""
+    x = np.clip((time - crossing.time) / lasts, 0.0, 1.0)
+    there = x < 1.0
+    first = there * power * x ** (power - 1) / lasts
+    second = (there & (x > 0.0)) * power * (power - 1) * x ** (power - 2) / lasts**2
+    return crossing.side * np.stack([x**power, first, second])
+
+
+def _side_by_torque(deflection: _Deflection, time: Floats) -> Floats:
     """Return where in the gap a link lies, from -1/2 to 1/2, with two derivatives at the times (T,): shape (3, T).
 
     Parameters
@@ -343,29 +396,38 @@ def _side_of_gap(deflection: _Deflection, time: Floats) -> Floats:
     time : (T,) array
         Times [s].
     """
-    begin, end = deflection.span
-    fine = np.linspace(begin, end, FINE * max(int((end - begin) / KNOTS), 1) + 1)
-    course = deflection.derivative(fine, 0)
-    loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max())
+    fine = _finely(*deflection.span)
+    first, reversals = _reversals(fine, deflection.derivative(fine, 0))
     side = np.zeros((3, len(time)))
-    if not len(loaded):
-        return side
-    side[0] = 0.5 * np.sign(course[loaded[0]])
-    for before, after in pairwise(loaded):
-        step = 0.5 * (np.sign(course[after]) - np.sign(course[before]))
-        if step:
-            crossing = fine[1] - fine[0], course[after - 1], course[after]
-            slope = abs(crossing[2] - crossing[1]) / crossing[0]
-            begins = fine[after] - abs(crossing[2]) / slope
-            slope = slope * np.interp(begins, *deflection.mobility)
-            # beside a motor that loses on it with this jerk, a coasting link crosses the gap in the third root of 6 g/j
-            lasts = float(np.clip((6.0 * TYPICAL_GAP / slope) ** (1.0 / 3.0), QUICKEST, SLOWEST))
-            x = np.clip((time - begins) / lasts, 0.0, 1.0)
-            across = x < 1.0
-            side[0] += step * x**3
-            side[1] += across * step / lasts * 3.0 * x**2
-            side[2] += across * step / lasts**2 * 6.0 * x
+    side[0] = 0.5 * first
+    for crossing in reversals:
+        # beside a motor that loses on it with this jerk, a coasting link crosses the gap in the third root of 6 g/j
+        jerk = crossing.slope * np.interp(crossing.time, *deflection.mobility)
+        side += _across(time, crossing, float(np.clip((6.0 * TYPICAL_GAP / jerk) ** (1.0 / 3.0), QUICKEST, SLOWEST)), 3)
     return side
+
+
+def _lagging(time: Floats, first: float, turns: Sequence[tuple[_Reversal, float]]) -> Floats:
+    """Return where in the gap a link lies that lags the motion of its joint, shape (3, T), as `_side_by_torque`.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Times [s].
+    first : float
+        Sign of the joint's speed at first.
+    turns : sequence of pairs
+        Changes of that sign, each with the time that it takes to cross the gap [s].
+    """
+    side = np.zeros((3, len(time)))
+    side[0] = -0.5 * first
+    for turn, lasts in turns:
+        side -= _across(time, turn, lasts, 2)
+    return side
+
+
+def _finely(begin: float, end: float) -> Floats:
+    return np.linspace(begin, end, FINE * max(int((end - begin) / KNOTS), 1) + 1)
 
 
 KNOTS = 0.5
