@@ -37,10 +37,14 @@ __all__ = [
     "extended_start",
     "fit_hypothesis",
     "fit_in_amplitudes",
+    "gain_beyond_linear",
 ]
 
 MOST_STARTS = 6
 """Most starting points of the fit of a hypothesis."""
+
+WIDER = 30.0
+"""Factor on the priors of a fit that is to show what the data alone say of its causes."""
 
 ROUNDS = 6
 """Simulations after which motion and perturbations agree at given unknowns."""
@@ -214,6 +218,45 @@ def fit_hypothesis(
     if best is None:
         raise problem
     return Hypothesis(perturbed, best, tuple(faults))
+
+
+def gain_beyond_linear(point: Linearisation, hypothesis: Hypothesis, agrees: float = DEFAULT_SETTINGS.agrees) -> float:
+    """Return by how much the full fit of some causes follows the data better than the linear model says [nats].
+
+    Both are compared without the priors of the causes' sizes, which differ. Where the fit seems worse, it is repeated
+    with priors so wide that they pull at nothing: what is left is what the linear model allows and physics does not,
+    such as a spring with a negative stiffness.
+
+    Parameters
+    ----------
+    point : Linearisation
+        From which the causes were fitted (`fit_hypothesis`).
+    hypothesis : Hypothesis
+        All of whose causes are effects or faults of the noise.
+    agrees : float
+        Difference that is none [nats].
+    """
+    fit = hypothesis.fit
+    names = sorted(effect.candidate for effect in fit.effects)
+    columns, deviations = point.evidence.most_probable(names, point.evidence.forms(names))
+    mean, gain = _mode(point, names, columns, deviations)
+    linear = point.predicted_cost - gain - 0.5 * float(((mean / deviations) ** 2).sum())
+
+    def misfit(of: Fit) -> float:
+        return of.cost - 0.5 * sum(float((values**2).sum()) for values in of.coordinates)
+
+    if misfit(fit) - linear > agrees:
+        wide, start = [], []
+        for effect, values in zip(fit.effects, fit.coordinates, strict=True):
+            wider = copy.copy(effect)
+            wider.parameters = tuple(one._replace(sigma=WIDER * one.sigma) for one in effect.parameters)
+            wide.append(wider)
+            start.append(values / WIDER)
+        along = fit.operating if point.far else None
+        again = hypothesis.perturbed.fit(wide, start, z=fit.z, operating=along)
+        fit = again if misfit(again) < misfit(fit) else fit
+    better = linear - misfit(fit)
+    return better if abs(better) > agrees and np.isfinite(better) else 0.0
 
 
 def extended_posterior(

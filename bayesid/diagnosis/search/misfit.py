@@ -6,16 +6,17 @@ hypotheses, The American Statistician 55).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis.candidates.cause_kind import kind_of
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.noise.family_alarm import noise_tests, structure_tests
 from bayesid.diagnosis.noise.noise_fault import FitResidual
-from bayesid.diagnosis.search.fitted_set import Hypothesis, exactly_fitted
+from bayesid.diagnosis.search.fitted_set import Hypothesis, exactly_fitted, gain_beyond_linear
 from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.simulation.effects.effect import Effect
@@ -25,16 +26,20 @@ __all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
 UNNAMED = "something beside the fitted causes"
 """Generic candidate that has no form: whatever the fitted causes leave."""
 
+NOTHING = 0.1
+"""Share of its linear evidence below which a set has none once it is simulated."""
+
 
 def with_misfit(
     search: ModelSearch, effects: Sequence[Effect], settings: DiagnosisSettings = DEFAULT_SETTINGS
 ) -> tuple[ModelSearch, dict[frozenset[str], Hypothesis]]:
     """Fit the most probable sets of causes in full, and weigh that they do not suffice.
 
-    The probabilities come from linear signatures. A set that does not follow the data once its effects are simulated
-    gets a companion: the same causes beside something else, with as much more evidence as the p-value of what is left
-    allows at most (`log_odds_of_anything`). One with which no motion can be simulated is no explanation: its evidence
-    goes to something else alone.
+    The probabilities come from linear signatures. What the full fit of a set gains or loses beyond them counts in its
+    evidence; vibrations have had theirs from fits. A set that does not follow the data once its effects are simulated
+    gets a companion: the same causes beside something else, or something else alone where they vanish in the fit, with
+    as much more evidence as the p-value of what is left allows at most (`log_odds_of_anything`). One with which no
+    motion can be simulated is no explanation: its evidence goes to something else alone.
 
     Parameters
     ----------
@@ -56,10 +61,17 @@ def with_misfit(
     probabilities = search.probabilities
     generics = (*probabilities.generics, UNNAMED)
     probabilities = SetProbabilities.of(probabilities.sets, probabilities.causes, generics, probabilities.prior)
+    comparable = {effect.label for effect in effects if not kind_of(effect).weighed_by_fits}
+    comparable |= {name for faults in search.searches for name in faults.noise.names}
     for _ in range(settings.most_full_fits):
-        known = (cause_set for cause_set in probabilities.sets if cause_set.causes and cause_set.generic is None)
-        best = next((cause_set for cause_set in known if frozenset(cause_set.causes) not in fitted), None)
+        # what stands beside something generic is to be possible as well
+        likeliest = (one for one in probabilities.sets if one.causes and frozenset(one.causes) not in fitted)
+        best = next(likeliest, None)
         if best is None or best.probability < settings.fitted_in_full_from:
+            break
+        causes = best.causes
+        best = next((one for one in probabilities.sets if one.causes == causes and one.generic is None), None)
+        if best is None:
             break
         under = search.under(best.causes)
         try:
@@ -69,11 +81,42 @@ def with_misfit(
             continue
         if under.point.far:
             hypothesis = exactly_fitted(hypothesis)
+        before = best.log_evidence
+        if set(best.causes) <= comparable and not under.point.far:
+            more = gain_beyond_linear(under.point, hypothesis, settings.agrees)
+            probabilities = _corrected(probabilities, best, more, fitted)
+            best = replace(best, log_evidence=best.log_evidence + more)
         fitted[frozenset(best.causes)] = hypothesis
         more = log_odds_of_anything(log_p_of_misfit(hypothesis))
-        companion = CauseSet(best.causes, UNNAMED, best.log_evidence + more)
-        probabilities = probabilities.with_sets([*probabilities.sets, companion])
+        sized = best.log_evidence > NOTHING * before  # else its causes vanish in the fit
+        companion = CauseSet(best.causes if sized else (), UNNAMED, best.log_evidence + more)
+        others = [one for one in probabilities.sets if one.names != companion.names]
+        probabilities = probabilities.with_sets([*others, companion])
     return replace(search, probabilities=probabilities), fitted
+
+
+def _corrected(
+    probabilities: SetProbabilities, fitted: CauseSet, more: float, known: Container[frozenset[str]]
+) -> SetProbabilities:
+    """Return the probabilities where one set has more evidence, or less.
+
+    What the linear model allows and the simulation does not, it allows beside anything else as well: sets that hold the
+    fitted one lose as large a share of what its causes gain in them. Those of other causes that are known are kept.
+    """
+    evidence = {one.names: one.log_evidence for one in probabilities.sets}
+    share = min(more / max(fitted.log_evidence, 1.0), 0.0)
+
+    def change(one: CauseSet) -> float:
+        if one is fitted:
+            return more
+        if share == 0.0 or not set(fitted.causes) <= set(one.causes) or frozenset(one.causes) in known:
+            return 0.0
+        others = tuple(name for name in one.names if name not in fitted.causes)
+        return min(share * (one.log_evidence - evidence.get(others, 0.0)), more)
+
+    return probabilities.with_sets(
+        replace(one, log_evidence=one.log_evidence + change(one)) for one in probabilities.sets
+    )
 
 
 def _without_motion(probabilities: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
