@@ -10,7 +10,10 @@ from bayesid._io.short_form import ShortForm, Summary, format_probability, forma
 from bayesid.inference.body_quantities import BODY_QUANTITIES, body_dict
 from bayesid.inference.importance import Evidence
 from bayesid.inference.mode import Optimum
+from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.inference.posterior_file import write_netcdf
 from bayesid.inference.sampler import chains_of
+from bayesid.robot.inertial_parameters import mass_com_inertia
 
 DRAWS = 400
 
@@ -59,6 +62,13 @@ def test_the_data_tree_has_the_groups_of_arviz(result):
     assert tree["prior"]["base_link.mass"].attrs["unit"] == posterior["base_link.mass"].attrs["unit"] == "kg"
     assert float(tree["prior"]["z"].std()) == pytest.approx(1.0, abs=0.03)
     assert tree["posterior_predictive"]["rate.planar"].dims[-1] == tree["observed_data"]["rate.planar"].dims[-1]
+
+
+def test_a_file_of_draws_is_read_as_it_was_written(result, tmp_path):
+    write_netcdf(result, tmp_path / "posterior.nc", np.random.default_rng(0))
+    draws = InertialDraws.read(tmp_path / "posterior.nc").of_bodies(["base_link"]).values
+    expected = result.bodies["base_link"]
+    np.testing.assert_allclose(mass_com_inertia(draws[:, 0]), expected.values, rtol=1e-9, atol=1e-12)
 
 
 def test_a_result_is_shown_by_a_few_lines(result):
