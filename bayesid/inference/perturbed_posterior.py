@@ -163,6 +163,8 @@ class LinearResponses:
 
     def _raw(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the raw readings, shape (n, R, T, q)."""
+        if not any(part.any() for part in perturbations[:4]):  # faults of sensors
+            return np.zeros((len(perturbations.reading), *self.motion.reading.shape))
         grid, motion = self.arrays.grid, self.motion
         size, samples = np.asarray(grid.step)[..., None, None], np.asarray(grid.step_of)
         steps = size.shape[1]
@@ -198,7 +200,11 @@ class LinearResponses:
 def _changed_by(derivatives: Floats, rows: Floats, wrench: Floats) -> Floats:
     """Return what perturbations (n, ..., 28) and (n, ..., 6) change by derivatives (..., m, 34), (..., n, m)."""
     turned = np.swapaxes(derivatives, -1, -2)
-    return np.moveaxis(rows, 0, -2) @ turned[..., :WIDTH, :] + np.moveaxis(wrench, 0, -2) @ turned[..., WIDTH:, :]
+    changed: Floats = np.zeros((*rows.shape[1:-1], len(rows), turned.shape[-1]))
+    for part, slopes in ((rows, turned[..., :WIDTH, :]), (wrench, turned[..., WIDTH:, :])):
+        if part.any():  # most perturbations have one of them
+            changed += np.moveaxis(part, 0, -2) @ slopes
+    return changed
 
 
 def _stages(state: Floats, size: Floats, forced: list[Floats] | None) -> tuple[list[Floats], Floats]:
