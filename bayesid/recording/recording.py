@@ -375,8 +375,8 @@ def _check_names(columns: Sequence[str], file: Path | str) -> None:
 
 
 def _read_csv(file: Path) -> dict[str, Array]:
-    if file.stat().st_size > LARGE and (columns := _read_plain_csv(file)) is not None:
-        return columns
+    if file.stat().st_size > LARGE and (plain := _read_plain_csv(file)) is not None:
+        return plain
     try:
         with file.open(newline="", encoding="utf-8-sig") as stream:
             rows = list(csv.reader(stream, strict=True))
