@@ -123,7 +123,7 @@ class InstantCause(CauseKind):
             if found.inclusion[effect.label] >= least:
                 best = next(item for item in found.sets if effect.label in item.causes)
                 others = tuple(name for name in best.causes if name != effect.label)
-                events = {item.effect.candidate for item in point.bank.signatures if item.effect is not None}
+                events = {form.effect.candidate for form in point.bank.signatures if form.effect is not None}
                 # an event among them may stand for the jump of a recording in which the grid has none
                 for company in {others: None, tuple(name for name in others if name not in events): None}:
                     point = self._tuned(point, effect, company, bounds[effect.label])
