@@ -37,7 +37,6 @@ from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.ensemble import Chains
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
-from bayesid.inference.no_motion import refuse_no_motion
 from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import identified_robot
@@ -437,12 +436,11 @@ def identify(
     Raises
     ------
     InputError
-        If nothing moves, no value of the unknowns comes near the data, or the sampler does not return draws of the
+        If no value of the unknowns comes near the data, or the sampler does not return draws of the
         posterior; `DivergenceError` where no fit is finite.
     """
     if sampler is not None and file is not None:
         raise InputError("a sampler and a file of emcee are given", remedy="Give sampler=Emcee(file=...) alone")
-    refuse_no_motion(posterior)
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     if not optimum.chi2 < HOPELESS * refined.samples:

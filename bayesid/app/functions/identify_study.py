@@ -12,6 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.app.functions.study_source import StudySource, recorded_posterior
 from bayesid.inference import identification
 from bayesid.inference.identification import Identification
+from bayesid.inference.no_motion import refuse_no_motion
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.sampler import Sampler
 
@@ -52,11 +53,12 @@ def identify(
     Raises
     ------
     InputError
-        If the study is wrong, nothing is unknown, or no value of the unknowns comes near the data.
+        If the study is wrong, nothing is unknown, nothing moves, or no value of the unknowns comes near the data.
     """
     posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
     if not posterior.size:
         raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
+    refuse_no_motion(posterior)
     return identification.identify(
         posterior,
         seed,
