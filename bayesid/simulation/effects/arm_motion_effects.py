@@ -20,7 +20,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, configuration, kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Prior
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Prior, Quantity
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
@@ -322,6 +322,16 @@ class JointBacklash(_DisplacedMotion, OnJoint):
             return (PhysicalBound("m", LARGEST_GAP_OF_SLIDE, reason),)
         reason = f"A joint with more than {LARGEST_GAP:g} rad of play, half a degree, is felt with the hand."
         return (PhysicalBound("rad", LARGEST_GAP, reason),)
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """The gap, and its shares."""
+        shares = super().quantities
+        return [Quantity("gap", shares[0].unit), *shares]
+
+    def report(self, values: Array) -> Array:
+        """Return the gap, and its shares."""
+        return jnp.concatenate([values.sum(keepdims=True), values])
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the displacements of the link per gap of each kind, as central differences."""
