@@ -26,19 +26,16 @@ __all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
 UNNAMED = "something beside the fitted causes"
 """Generic candidate that has no form: whatever the fitted causes leave."""
 
-NOTHING = 0.1
-"""Share of its linear evidence below which a set has none once it is simulated."""
-
 
 def with_misfit(
     search: ModelSearch, effects: Sequence[Effect], settings: DiagnosisSettings = DEFAULT_SETTINGS
 ) -> tuple[ModelSearch, dict[frozenset[str], Hypothesis]]:
     """Fit the most probable sets of causes in full, and weigh that they do not suffice.
 
-    The probabilities come from linear signatures. What the full fit of a set gains or loses beyond them counts in its
-    evidence; vibrations have had theirs from fits. A set that does not follow the data once its effects are simulated
-    gets a companion: the same causes beside something else, or something else alone where they vanish in the fit, with
-    as much more evidence as the p-value of what is left allows at most (`log_odds_of_anything`). One with which no
+    The probabilities come from linear signatures. What the full fit of a set loses against them counts in its evidence;
+    what it gains does not, since its rivals are not all fitted, and vibrations have had theirs from fits. A set that
+    does not follow the data once its effects are simulated gets a companion: the same causes beside something else,
+    with as much more evidence as the p-value of what is left allows at most (`log_odds_of_anything`). One with which no
     motion can be simulated is no explanation: its evidence goes to something else alone.
 
     Parameters
@@ -73,49 +70,51 @@ def with_misfit(
         best = next((one for one in probabilities.sets if one.causes == causes and one.generic is None), None)
         if best is None:
             break
-        under = search.under(best.causes)
+        under = search.under(causes)
         try:
-            hypothesis = under.fit(best.causes, effects)
+            hypothesis = under.fit(causes, effects)
         except InputError:
             probabilities = _without_motion(probabilities, best)
             continue
         if under.point.far:
             hypothesis = exactly_fitted(hypothesis)
-        before = best.log_evidence
-        if set(best.causes) <= comparable and not under.point.far:
-            more = gain_beyond_linear(under.point, hypothesis, settings.agrees)
-            probabilities = _corrected(probabilities, best, more, fitted)
-            best = replace(best, log_evidence=best.log_evidence + more)
-        fitted[frozenset(best.causes)] = hypothesis
-        more = log_odds_of_anything(log_p_of_misfit(hypothesis))
-        sized = best.log_evidence > NOTHING * before  # else its causes vanish in the fit
-        companion = CauseSet(best.causes if sized else (), UNNAMED, best.log_evidence + more)
-        others = [one for one in probabilities.sets if one.names != companion.names]
-        probabilities = probabilities.with_sets([*others, companion])
+        if set(causes) <= comparable and not under.point.far:
+            loss = -min(gain_beyond_linear(under.point, hypothesis, settings.agrees), 0.0)
+            probabilities = _with_loss(probabilities, best, loss, fitted)
+        fitted[frozenset(causes)] = hypothesis
+    companions = [
+        replace(one, generic=UNNAMED, log_evidence=one.log_evidence + more)
+        for one in probabilities.sets
+        if one.generic is None and one.probability >= settings.fitted_in_full_from and frozenset(one.causes) in fitted
+        for more in [log_odds_of_anything(log_p_of_misfit(fitted[frozenset(one.causes)]))]
+    ]
+    probabilities = probabilities.with_sets([*probabilities.sets, *companions])
     return replace(search, probabilities=probabilities), fitted
 
 
-def _corrected(
-    probabilities: SetProbabilities, fitted: CauseSet, more: float, known: Container[frozenset[str]]
+def _with_loss(
+    probabilities: SetProbabilities, fitted: CauseSet, loss: float, known: Container[frozenset[str]]
 ) -> SetProbabilities:
-    """Return the probabilities where one set has more evidence, or less.
+    """Return the probabilities where one set has less evidence.
 
     What the linear model allows and the simulation does not, it allows beside anything else as well: sets that hold the
     fitted one lose as large a share of what its causes gain in them. Those of other causes that are known are kept.
     """
+    if loss == 0.0:
+        return probabilities
     evidence = {one.names: one.log_evidence for one in probabilities.sets}
-    share = min(more / max(fitted.log_evidence, 1.0), 0.0)
+    share = loss / max(fitted.log_evidence, 1.0)
 
-    def change(one: CauseSet) -> float:
+    def lost(one: CauseSet) -> float:
         if one is fitted:
-            return more
-        if share == 0.0 or not set(fitted.causes) <= set(one.causes) or frozenset(one.causes) in known:
+            return loss
+        if not set(fitted.causes) <= set(one.causes) or frozenset(one.causes) in known:
             return 0.0
         others = tuple(name for name in one.names if name not in fitted.causes)
-        return min(share * (one.log_evidence - evidence.get(others, 0.0)), more)
+        return max(share * (one.log_evidence - evidence.get(others, 0.0)), loss)
 
     return probabilities.with_sets(
-        replace(one, log_evidence=one.log_evidence + change(one)) for one in probabilities.sets
+        replace(one, log_evidence=one.log_evidence - lost(one)) for one in probabilities.sets
     )
 
 
