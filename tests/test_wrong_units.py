@@ -82,14 +82,11 @@ def test_the_column_in_another_unit_is_named(slip: str, message: str, study: Pat
         refuse_wrong_units(Posterior.of(model, load_manoeuvres(loaded, model.robot), window=0))
 
 
-def test_rates_in_arcseconds_are_named_and_refused_before_anything_is_simulated(study: Path, tmp_path: Path) -> None:
+def test_rates_in_arcseconds_are_named_before_anything_is_simulated(study: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(study.parent, tmp_path / "study")
     SLIPS["rate in arcseconds per second"](folder)
     loaded = Study.load(folder / study.name)
-    message = r"manoeuvre-1\.csv: column rate\..: half of the readings are beyond \d+ rad/s.*Give rates in rad/s"
     model = load_model(loaded)
     manoeuvres = load_manoeuvres(loaded, model.robot)
     conventions = find_conventions(model, manoeuvres)
     assert [one.remedy for one in conventions] == ['[sensors.rate]\nunit = "arcsec/s"']
-    with pytest.raises(InputError, match=message):
-        refuse_wrong_units(Posterior.of(model, manoeuvres, window=0))
