@@ -60,12 +60,12 @@ def exercised(posterior: Posterior) -> None:
 def compiled(planar_posterior: Callable[..., Posterior]) -> Posterior:
     """A posterior all of whose functions have been compiled.
 
-    Its sensors' noise is twice that of the small case, in which the encoders' noise is just at the level from which
+    Its sensors' noise is four times that of the small case, in which the encoders' noise is just at the level from which
     readings are whitened by windows.
     """
     base = planar_posterior(np.random.default_rng(3), step=0.5)
     model = base.model.extend(SensorBias.of(SensorKind.ACCEL)(1e-4)).extend(Payload("link2", 0.2))
-    model = replace(model, sensors=tuple(replace(sensor, noise=White(2e-5)) for sensor in model.sensors))
+    model = replace(model, sensors=tuple(replace(sensor, noise=White(4e-5)) for sensor in model.sensors))
     posterior = Posterior.of(model, base.manoeuvres, step=0.5)
     with counted() as seen:
         exercised(posterior)
@@ -90,7 +90,7 @@ def test_another_prior_compiles_nothing(compiled):
 @pytest.mark.slow
 def test_another_noise_and_another_place_of_the_sensor_compile_nothing(compiled):
     rate, accel = compiled.model.sensors
-    sensors = (replace(rate, noise=White(2.2e-5)), replace(accel, noise=White(2.2e-5), position=(0.3, 0.2, 0.1)))
+    sensors = (replace(rate, noise=White(4.4e-5)), replace(accel, noise=White(4.4e-5), position=(0.3, 0.2, 0.1)))
     with counted() as seen:
         other = Posterior.of(replace(compiled.model, sensors=sensors), compiled.manoeuvres, step=0.5)
         z = np.zeros(other.size)
