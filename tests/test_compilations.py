@@ -60,8 +60,8 @@ def exercised(posterior: Posterior) -> None:
 def compiled(planar_posterior: Callable[..., Posterior]) -> Posterior:
     """A posterior all of whose functions have been compiled.
 
-    Its sensors' noise is four times that of the small case, in which the encoders' noise is just at the level from which
-    readings are whitened by windows.
+    Its sensors' noise is four times that of the small case, in which the encoders' noise is just at the level from
+    which readings are whitened by windows.
     """
     base = planar_posterior(np.random.default_rng(3), step=0.5)
     model = base.model.extend(SensorBias.of(SensorKind.ACCEL)(1e-4)).extend(Payload("link2", 0.2))

@@ -14,7 +14,7 @@ import scipy.linalg as sla
 from bayesid._io.errors import InputError
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening, apply, build
+from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening, apply, build
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
@@ -42,15 +42,15 @@ def noise_model(channels: list[NoiseChannel], time: np.ndarray = TIME, encoder: 
         value = 0.3 * np.sin(0.4 * time + index) + encoder * rng.normal(size=len(time))
         joints.append(smooth([JointSamples(0, time, value, encoder)]).lag_covariance(time, len(time) - 1))
     sensitivity = rng.normal(size=(2, 3, len(time), len(channels)))
-    return SampleNoise(time, channels, sensitivity, np.stack(joints))
+    return SampleNoise(time, channels, [MotionErrors(sensitivity, np.stack(joints))])
 
 
 def dense(noise: SampleNoise) -> np.ndarray:
     """Covariance of all channels at all rows of the grid, index (row, channel), written out."""
     count, channels = len(noise.time), len(noise.channels)
     total = np.zeros((count, channels, count, channels))
-    for joint, own in enumerate(noise.joint_covariance):
-        g = noise.sensitivity[joint]
+    (errors,) = noise.errors
+    for g, own in zip(*errors, strict=True):
         for late in range(count):
             for early in range(late + 1):
                 block = g[:, late].T @ own[late - early, late] @ g[:, early]
@@ -140,8 +140,7 @@ def test_a_filter_does_not_reach_across_a_gap():
     gap = np.arange(50, 60)
     rows = np.delete(np.arange(len(time)), gap)
     plain = Filter(0.25)
-    nothing = np.zeros((0, 3, len(time), 1)), np.zeros((0, 1, len(time), 3, 3))
-    noise = SampleNoise(time, [NoiseChannel(1.0, rows, plain)], *nothing)
+    noise = SampleNoise(time, [NoiseChannel(1.0, rows, plain)])
     result = build(noise, window=0)
     half = len(plain.taps(0.5)) // 2
     expected = [*range(half, 50 - half), *range(60 + half, len(time) - half)]

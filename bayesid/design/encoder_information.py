@@ -62,8 +62,7 @@ def encoder_directions(plan: Plan, parameters: Floats, rate: Floats) -> Floats:
     environment = time_tables(robot, (), (), motion, times, plan.model.orbit, plan.argument_of_latitude).environment
     attitude = np.tile(np.asarray(plan.attitude, dtype=float), (len(times), 1))
     seen = SampledMotion(attitude, rate, jax.tree.map(np.asarray, environment))
-    every = joint_sensitivity(robot, motion.evaluate(times), seen, plan.model.sensors) / plan.sigma
-    sensitivity = every[: len(robot.joints)]  # those of the wheels follow
+    sensitivity = joint_sensitivity(robot, motion.evaluate(times), seen, plan.model.sensors) / plan.sigma
     end = plan.family.duration
     count = min(FASTEST, len(times) // 2)
     errors = np.einsum("jdtc,dtk->tcjk", sensitivity, _cosines(times, end, count))

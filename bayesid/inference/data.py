@@ -14,8 +14,9 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
 from bayesid.inference.compiled import Arrays, Averaging
-from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
-from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening
+from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity, wheel_sensitivity
+from bayesid.inference.wheel_noise import wheel_errors
+from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening
 from bayesid.recording.actions import Actions
 from bayesid.recording.blocks import Blocks
 from bayesid.recording.full_rate import spikes
@@ -489,18 +490,18 @@ class RecordedSamples:
             relative = mean_deviation(one, self.torque[1][:, column], sigma, self.steps["torque"][column])
             used = np.searchsorted(one.time, self.time[rows])
             channels.append(NoiseChannel(sigma * relative[used], rows, Filter()))
-        measured = isinstance(self.motion, MeasuredMotion) and bool(robot.joints)
-        if not measured and not robot.wheels:
-            empty = np.zeros((0, 3, len(self.time), len(channels)))
-            return SampleNoise(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
+        state = self.motion.evaluate(self.time)
         torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
-        sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
         alone = window == 0 and all(sensor.filter == Filter() for sensor in self.sensors)
         lags = 0 if alone else min(max(whitening.WINDOWS), len(self.time) - 1)
-        covariance = self.wheels.lag_covariance(self.time, lags)
-        if isinstance(self.motion, MeasuredMotion):
-            covariance = np.concatenate([self.motion.lag_covariance(self.time, lags), covariance])
-        return SampleNoise(self.time, channels, sensitivity[-len(covariance) :], covariance)
+        errors = []
+        if isinstance(self.motion, MeasuredMotion) and robot.joints:
+            sensitivity = joint_sensitivity(robot, state, seen, self.sensors, torques)
+            errors.append(MotionErrors(sensitivity, self.motion.lag_covariance(self.time, lags)))
+        if self.wheels.is_uncertain:
+            slopes = wheel_sensitivity(robot, state, seen, self.sensors, torques)
+            errors.append(wheel_errors(self.wheels, self.time, seen.rate, slopes, lags))
+        return SampleNoise(self.time, channels, errors)
 
     def _noise_channels(self, sensor: Sensor) -> list[NoiseChannel]:
         """Return the noise of every axis of a sensor."""

@@ -43,7 +43,6 @@ from bayesid.inference.posterior_as_prior import identified_robot
 from bayesid.inference.posterior_file import to_arviz
 from bayesid.inference.predicted_readings import SensorFit, TorqueFit, integration_error_at, sensor_fits, torque_fits
 from bayesid.inference.sampler import Emcee, Sampler, SamplingTarget, chains_of
-from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
 
@@ -202,8 +201,9 @@ class Identification(ShortForm):
                 if sigma > 0.0:
                     drawn = np.asarray(draws)[:, index]
                     mean, sd = drawn.mean(axis=0), drawn.std(axis=0, ddof=1)
-                    if name == "initial rate" and isinstance(manoeuvre.motion, MeasuredMotion):
-                        sd = np.hypot(sd, first_rate_sd(self.robot, manoeuvre.motion))
+                    if name == "initial rate":
+                        samples = self.posterior.data.recorded[index]
+                        sd = np.hypot(sd, first_rate_sd(self.robot, samples.motion, samples.wheels))
                     states.append(StartState(manoeuvre.recording.name, name, unit, float(sigma), mean, sd))
         return tuple(states)
 

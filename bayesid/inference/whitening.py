@@ -22,7 +22,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid.simulation.sensors import Filter
 
-__all__ = ["NoiseChannel", "SampleNoise", "Whitening", "apply", "build"]
+__all__ = ["MotionErrors", "NoiseChannel", "SampleNoise", "Whitening", "apply", "build"]
 
 
 WINDOWS = (0, 2, 4, 8, 16, 32)
@@ -105,6 +105,21 @@ def _log_sinh(x: Floats) -> Floats:
     return np.asarray(x + np.log(-np.expm1(-2.0 * x)))
 
 
+class MotionErrors(NamedTuple):
+    """Errors of the motion of S joints or wheels, which are independent of one another, in K quantities each.
+
+    Attributes
+    ----------
+    sensitivity : (S, K, T, C) array
+        Change of each channel per unit error of each quantity at that time.
+    covariance : (S, lags + 1, T, K, K) array
+        Covariances of these errors with those at up to ``lags`` earlier samples.
+    """
+
+    sensitivity: Floats
+    covariance: Floats
+
+
 @dataclass(frozen=True)
 class SampleNoise:
     """Second moments of one recording's errors.
@@ -115,16 +130,18 @@ class SampleNoise:
         Sample grid of all times at which any channel has a sample [s].
     channels : sequence of NoiseChannel
         Noise and sampling of the C channels.
-    sensitivity : (joints, 3, T, C) array
-        Change of each channel per unit error of joint position, velocity and acceleration at that time.
-    joint_covariance : (joints, lags + 1, T, 3, 3) array
-        Covariances of these errors with those at up to ``lags`` earlier samples.
+    errors : sequence of MotionErrors
+        Errors of the motion of joints and wheels.
     """
 
     time: Floats
     channels: Sequence[NoiseChannel]
-    sensitivity: Floats
-    joint_covariance: Floats
+    errors: Sequence[MotionErrors] = ()
+
+    @property
+    def lags(self) -> int:
+        """Largest number of earlier samples with which the errors of the motion are correlated."""
+        return max((errors.covariance.shape[1] - 1 for errors in self.errors), default=0)
 
 
 class Whitening(NamedTuple):
@@ -210,7 +227,7 @@ def build(noise: SampleNoise, window: int | None = None) -> Whitening:
 
 
 def _shortest(noise: SampleNoise, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
-    available = max(WINDOWS) if _is_coloured(noise) else noise.joint_covariance.shape[1] - 1
+    available = max(WINDOWS) if _is_coloured(noise) else noise.lags
     best = _whiten(noise, outputs, 0)
     for window in WINDOWS[1:]:
         if window > available:
@@ -387,18 +404,18 @@ class _Covariance:
 
     def __init__(self, noise: SampleNoise, lags: int) -> None:
         self._noise = noise
-        self._lags = min(noise.joint_covariance.shape[1] - 1, lags)
-        count, self._channels = noise.sensitivity.shape[2:]
+        self._lags = min(noise.lags, lags)
+        count, self._channels = len(noise.time), len(noise.channels)
         self._blocks = np.zeros((self._lags + 1, count, self._channels, self._channels))
-        g = noise.sensitivity
-        for lag in range(min(self._lags, count - 1) + 1):
-            self._blocks[lag, lag:] = np.einsum(
-                "jatc,jtab,jbtd->tcd",
-                g[:, :, lag:],
-                noise.joint_covariance[:, lag, lag:],
-                g[:, :, : count - lag],
-                optimize=True,
-            )
+        for g, covariance in noise.errors:
+            for lag in range(min(self._lags, covariance.shape[1] - 1, count - 1) + 1):
+                self._blocks[lag, lag:] += np.einsum(
+                    "jatc,jtab,jbtd->tcd",
+                    g[:, :, lag:],
+                    covariance[:, lag, lag:],
+                    g[:, :, : count - lag],
+                    optimize=True,
+                )
         self._blocks[0, :, range(self._channels), range(self._channels)] += np.array(
             [channel.gridded(channel.sigma, count) ** 2 for channel in noise.channels]
         )

@@ -70,6 +70,11 @@ class WheelMotion:
             curves[k] = joint
         return cls(tuple(rotors), tuple(curves))
 
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether the motion of any wheel is smoothed from samples with errors."""
+        return any(isinstance(curve, SmoothedJoint) for curve in self.curves)
+
     def momentum(self, time: Floats) -> tuple[Floats, Floats]:
         """Return the momentum of the wheels and its derivative at the times (T,), base axes, each of shape (T, 3)."""
         along = np.array([wheel.inertia * np.asarray(wheel.axis) for wheel in self.rotors]).reshape(-1, 3)

@@ -19,7 +19,7 @@ from bayesid import Manoeuvre, MeasuredMotion, Posterior, Recording, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
-from bayesid.inference.whitening import NoiseChannel, SampleNoise, build
+from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, build
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
 from studies.base_body import paper
@@ -66,8 +66,8 @@ class Linear:
         rows = np.arange(count) if left_out is None else np.flatnonzero(~left_out)
         samples = np.arange(len(rows))
         channels = [NoiseChannel(sigma, samples, Filter()) for sigma in (noise.rate, noise.accel) for _ in range(3)]
-        covariance = measured.lag_covariance(self.time[rows], LAGS)
-        banded = build(SampleNoise(self.time[rows], channels, self.joints[:, :, rows], covariance))
+        errors = MotionErrors(self.joints[:, :, rows], measured.lag_covariance(self.time[rows], LAGS))
+        banded = build(SampleNoise(self.time[rows], channels, [errors]))
         dense = np.zeros((len(banded.start), 6, len(rows), 6))
         for block, start in enumerate(banded.start):
             reach = min(banded.weights.shape[2], len(rows) - start)
