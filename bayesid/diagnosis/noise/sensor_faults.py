@@ -99,13 +99,18 @@ class ColouredNoise(SensorFault):
         return Quantity("sigma", self.kind.unit), Quantity("time", "s")
 
     def log_p_of(self, residual: SensorResidual, posterior: Posterior) -> float:
-        """Return the logarithm of the p-value of positive autocorrelation, for the best of some correlation times."""
+        """Return the logarithm of the p-value of more slow noise than declared, for the best of some correlation times.
+
+        The score of coloured noise beside the declared one is the autocorrelation with its lag of zero: fast noise that
+        is overstated, as that of a smoothed motion may be, makes neighbours alike without any noise that is not known.
+        """
         pieces = [piece / residual.scale for piece in residual.pieces]
+        lacking = 0.5 * sum(float(piece @ piece) - len(piece) for piece in pieces)
         best = 0.0
         for time in self.TIMES:
             rho = np.exp(-1.0 / time)
             lags = np.arange(1, int(3.0 * time) + 1)
-            total, variance = 0.0, 0.0
+            total, variance = min(lacking, 0.0), 0.0
             for piece in pieces:
                 for lag in lags[lags < len(piece)]:
                     total += rho**lag * float(piece[lag:] @ piece[:-lag])
