@@ -16,6 +16,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.conventions import find_conventions
 from studies.common.monte_carlo import Workers, run_trials
+from studies.conventions.drawn_robots import write_robot
 from studies.conventions.mistakes import MISTAKES
 from studies.conventions.right_studies import UNUSUAL, circumstances
 from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4
@@ -24,6 +25,7 @@ from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.recordings import Sensors
 
 ROBOTS: Mapping[str, Path] = {"servicer3": SERVICER3, "servicer4": SERVICER4, "branched": BRANCHED}
+DRAWN = range(7)  # seeds of the robots that are drawn
 AMPLITUDES, NOISES = (0.2, 0.6, 1.2), (1e-6, 1e-5, 1e-4)  # of the joints [rad], and of all sensors [rad/s, m/s2]
 LOOKS = 12  # circumstances of each right study
 STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0)  # of what is hidden, relative to what a diagnosis sees well
@@ -53,30 +55,32 @@ class Outcome:
 
 def tasks(full: bool) -> list[dict[str, Any]]:
     """Return what is tried: every hidden cause of the catalogue and beyond, and every mistake."""
-    repeats = range(6 if full else 1)
     strengths = STRENGTHS if full else STRENGTHS[1::2]
     looks = LOOKS if full else 3
     right = [
-        {"case": case.name, "strength": strength, "seed": 5000 + 17 * number + repeat, "looks": looks}
+        {"case": case.name, "strength": strength, "seed": 5000 + 17 * number, "looks": looks}
         for number, case in enumerate(CASES)
         for strength in strengths
         if strength <= 1.0 or case.name != "gravity-gradient"  # its orbit would be inside the Earth
-        for repeat in repeats
     ]
     right += [
         {"case": name, "strength": 1.0, "seed": 400 + k, "looks": looks}
         for name in UNUSUAL
-        for k in range(60 if full else 1)
+        for k in range(20 if full else 1)
     ]
-    kinds = [(robot, size, noise) for robot in ROBOTS for size in AMPLITUDES for noise in NOISES]
-    used = kinds if full else [("servicer3", 0.6, 1e-5)]
+    robots = [*ROBOTS, *(f"drawn{seed}" for seed in DRAWN)] if full else ["servicer3"]
     wrong = [
-        {"mistake": name, "robot": robot, "amplitude": size, "noise": noise, "seed": 9000 + repeat}
-        for name in MISTAKES
-        for robot, size, noise in used
-        for repeat in (range(3) if full else range(1))
+        {"mistake": name, "robot": robot, "amplitude": size, "noise": noise, "seed": 9000 + first}
+        for first, name in enumerate(MISTAKES)
+        for second, robot in enumerate(robots)
+        for size, noise in (_sizes(first + second) if full else [(0.6, 1e-5)])
     ]
     return right + wrong
+
+
+def _sizes(turn: int) -> list[tuple[float, float]]:
+    """Return each amplitude once, each with another noise: three robots or mistakes in turn see all pairs."""
+    return [(size, NOISES[(turn + number) % len(NOISES)]) for number, size in enumerate(AMPLITUDES)]
 
 
 def trial(task: Mapping[str, Any], generator: np.random.Generator) -> dict[str, Any]:
@@ -106,7 +110,9 @@ def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
     sensors = Sensors(rate_sigma=noise, accel_sigma=noise, attitude_sigma=noise, attitude_period=2.0)
     manoeuvres = Manoeuvres(count=1, duration=60.0, amplitude=task["amplitude"])
     draw = np.random.default_rng(task["seed"])
-    file = write_study(folder, ROBOTS[task["robot"]], draw, sensors=sensors, manoeuvres=manoeuvres).file
+    name = task["robot"]
+    urdf = ROBOTS[name] if name in ROBOTS else write_robot(folder / "drawn.urdf", int(name.removeprefix("drawn")))
+    file = write_study(folder / "study", urdf, draw, sensors=sensors, manoeuvres=manoeuvres).file
     mistake.make(file)
     began = time.process_time()
     conventions = conventions_of(Study.load(file))
