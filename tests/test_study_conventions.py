@@ -19,15 +19,15 @@ from studies.conventions.right_studies import UNUSUAL, circumstances
 from studies.conventions.trials import Outcome, tasks, trial
 from studies.truth.hidden_causes import CASES
 
-NAMED = Outcome("sign", True, "servicer3", 0.6, 1e-5, ("convention:sign:j",), ("convention:sign:j",), True, 2.0)
-QUIET = Outcome("leak", False, "servicer3", 0.6, 1e-5, (), (), True, 0.1)
+NAMED = Outcome("sign", True, "servicer3", 0.6, 1e-5, ("convention:sign:j",), ("convention:sign:j",), True, True, 2.0)
+QUIET = Outcome("leak", False, "servicer3", 0.6, 1e-5, (), (), True, True, 0.1)
 
 
 def test_every_mistake_and_every_cause_is_tried() -> None:
     planned = tasks(full=False)
     assert {task["mistake"] for task in planned if "mistake" in task} == set(MISTAKES)
     assert {task["case"] for task in planned if "case" in task} == {case.name for case in CASES} | set(UNUSUAL)
-    assert len(tasks(full=True)) > 20 * len(planned)
+    assert len(tasks(full=True)) > 15 * len(planned)
 
 
 def verdicts(outcomes: Sequence[Outcome]) -> list[Verdict]:
@@ -38,6 +38,8 @@ def test_goals_follow_from_the_outcomes() -> None:
     assert verdicts([NAMED] * 4000 + [QUIET] * 9000) == [Verdict.PASS] * 3
     alarmed = replace(QUIET, said=("convention:sign:j",), alarms=1, seconds=9.0)
     assert verdicts([NAMED] * 4000 + [QUIET] * 900 + [alarmed] * 100)[0] == Verdict.FAIL
+    unseen = replace(NAMED, said=(), visible=False)
+    assert verdicts([NAMED] * 4000 + [unseen] * 500 + [QUIET] * 9000) == [Verdict.PASS] * 3
     unmended = replace(NAMED, mended=False)
     assert verdicts([NAMED] * 400 + [unmended] * 100 + [QUIET, alarmed])[1:] == [Verdict.FAIL, Verdict.FAIL]
 
@@ -57,3 +59,11 @@ def test_a_right_study_of_an_unusual_robot_is_left_in_peace_in_all_circumstances
     manoeuvres = load_manoeuvres(study, model.robot)
     for changed, recorded in circumstances(model, manoeuvres, np.random.default_rng(8), 6):
         assert find_conventions(changed, recorded) == []
+
+
+@pytest.mark.slow
+def test_joints_that_cannot_be_so_fast_speak_for_seconds() -> None:
+    """Rates in counts, small beside their noise, follow the motion in no unit of time that the joints could follow."""
+    number = [*MISTAKES].index("rates in counts")
+    task = {"mistake": "rates in counts", "robot": "servicer3", "amplitude": 0.2, "noise": 1e-4, "seed": 9000 + number}
+    assert "convention:unit:time" not in trial(task, np.random.default_rng(0))["said"]

@@ -28,7 +28,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.convention import Convention, ConventionError, in_one_line
 from bayesid.recording.joint_motion import Motion
-from bayesid.recording.plausibility import refuse_impossible_motion
+from bayesid.recording.plausibility import refuse_impossible_joints, refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.recording.units import STANDARD_GRAVITY, UNITS
 from bayesid.robot.joint_state import JointState
@@ -223,9 +223,10 @@ def _refuse_times(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
     timed = Recording(recording.name, recording.file, unit * recording.time, recording.channels)
     other = replace(manoeuvre, recording=timed, motion=_OtherTimes(manoeuvre.motion, unit))
     try:
+        refuse_impossible_joints(timed, posterior.model.robot)
         posterior = Posterior.of(posterior.model, [other], step=unit * posterior.step, window=0)
         again = {comparison.column: comparison.factor for comparison in _compared(posterior)[0]}
-    except InputError:  # no motion in so short a time: seconds it is
+    except InputError:  # joints do not move as fast, or there is no motion in so short a time: seconds it is
         return
     if all(1.0 / WRONG_UNIT < again[comparison.column] < WRONG_UNIT for comparison in loud):
         line = f'[telemetry]\ntime_unit = "{SHORT[name]}"'

@@ -19,14 +19,15 @@ from studies.common.monte_carlo import Workers, run_trials
 from studies.conventions.drawn_robots import write_robot
 from studies.conventions.mistakes import MISTAKES
 from studies.conventions.right_studies import UNUSUAL, circumstances
-from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4
+from studies.truth.bodies import SERVICER3, SERVICER4
 from studies.truth.hidden_causes import CASES
-from studies.truth.mujoco import Manoeuvres, write_study
+from studies.truth.mujoco import Manoeuvres, Truth, write_study
 from studies.truth.recordings import Sensors
 
-ROBOTS: Mapping[str, Path] = {"servicer3": SERVICER3, "servicer4": SERVICER4, "branched": BRANCHED}
-DRAWN = range(7)  # seeds of the robots that are drawn
+ROBOTS: Mapping[str, Path] = {"servicer3": SERVICER3, "servicer4": SERVICER4}
+DRAWN = range(8)  # seeds of the robots that are drawn
 AMPLITUDES, NOISES = (0.2, 0.6, 1.2), (1e-6, 1e-5, 1e-4)  # of the joints [rad], and of all sensors [rad/s, m/s2]
+VISIBLE = 3.0  # rms of the readings without noise, in sigma, from which on a mistake in them can be seen
 LOOKS = 12  # circumstances of each right study
 STRENGTHS = (0.3, 1.0, 3.0, 10.0, 30.0)  # of what is hidden, relative to what a diagnosis sees well
 
@@ -43,6 +44,7 @@ class Outcome:
     said: tuple[str, ...]  # names of the conventions
     expected: tuple[str, ...]
     mended: bool  # whether no convention is wrong once the remedies are written
+    visible: bool  # whether the readings that a mistake concerns stand out of their noise
     seconds: float
     looks: int = 1  # number of circumstances in which it was looked at
     alarms: int = 0  # number of those of a right study in which something was said
@@ -102,7 +104,7 @@ def _right_study(task: Mapping[str, Any], folder: Path) -> Outcome:
         seconds.append(time.process_time() - began)
     names = tuple(name for names in said for name in names)
     robot = model.robot.name if case is None else case.urdf.stem
-    return Outcome(name, False, robot, 0.0, 0.0, names, (), True, max(seconds), looks, sum(map(bool, said)))
+    return Outcome(name, False, robot, 0.0, 0.0, names, (), True, True, max(seconds), looks, sum(map(bool, said)))
 
 
 def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
@@ -112,7 +114,8 @@ def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
     draw = np.random.default_rng(task["seed"])
     name = task["robot"]
     urdf = ROBOTS[name] if name in ROBOTS else write_robot(folder / "drawn.urdf", int(name.removeprefix("drawn")))
-    file = write_study(folder / "study", urdf, draw, sensors=sensors, manoeuvres=manoeuvres).file
+    study = write_study(folder / "study", urdf, draw, sensors=sensors, manoeuvres=manoeuvres)
+    file, visible = study.file, _is_visible(study.truths[0], mistake.names, noise)
     mistake.make(file)
     began = time.process_time()
     conventions = conventions_of(Study.load(file))
@@ -120,7 +123,15 @@ def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
     file.write_text(with_remedies(file.read_text(), [convention.remedy for convention in conventions]))
     mended = bool(conventions) and not conventions_of(Study.load(file))
     kind = (task["mistake"], True, task["robot"], task["amplitude"], noise)
-    return Outcome(*kind, said, mistake.names, mended, seconds)
+    return Outcome(*kind, said, mistake.names, mended, visible, seconds)
+
+
+def _is_visible(truth: Truth, names: tuple[str, ...], noise: float) -> bool:
+    """Return whether each reading that a mistake concerns, or any where it is one of joints or times, is seen."""
+    sizes = {"rate": truth.rate, "accel": truth.accel}
+    seen = {kind: float(np.sqrt((values**2).mean())) > VISIBLE * noise for kind, values in sizes.items()}
+    concerned = {name.split(":")[2] for name in names} & set(seen)
+    return all(seen[kind] for kind in concerned) if concerned else any(seen.values())
 
 
 def run(
