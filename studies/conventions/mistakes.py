@@ -167,8 +167,8 @@ MISTAKES: dict[str, Blunder] = {
     "rates in degrees": Blunder(edited(_times("rate.", 180.0 / np.pi)), ("convention:unit:rate",)),
     "accelerations in g": Blunder(edited(_times("accel.", 1.0 / GRAVITY)), ("convention:unit:accel",)),
     "accelerations in milli-g": Blunder(edited(_times("accel.", 1e3 / GRAVITY)), ("convention:unit:accel",)),
-    "accelerations with gravity": Blunder(edited(_with_gravity(1.0)), ("convention:gravity:accel",), 1.0),
-    "accelerations with gravity, other sign": Blunder(edited(_with_gravity(-1.0)), ("convention:gravity:accel",), 1.0),
+    "accelerations with gravity": Blunder(edited(_with_gravity(1.0)), ("convention:gravity:accel",)),
+    "accelerations with gravity, other sign": Blunder(edited(_with_gravity(-1.0)), ("convention:gravity:accel",)),
     "attitudes with the scalar first": Blunder(
         edited(_quaternions(lambda q: q[[3, 0, 1, 2]])), ("convention:order:attitude",)
     ),

@@ -44,11 +44,23 @@ def _gravity(readings: ReadingsOnGrid, fixed: str) -> tuple[Floats, Floats]:
     accelerometer = readings.sensors[SensorKind.ACCEL]
     values = accelerometer.values[accelerometer.present]
     if fixed == "sensor":
-        mean = np.asarray(np.median(values, axis=0))
+        mean = _along_an_axis(values)
         return mean, np.broadcast_to(mean, accelerometer.values.shape)
     turned = readings.turned @ accelerometer.axes  # from sensor axes to base axes at the first instant
     first = np.median(np.einsum("tij,tj->ti", turned, accelerometer.values)[accelerometer.present], axis=0)
     return accelerometer.axes.T @ first, np.einsum("tij,i->tj", turned, first)
+
+
+def _along_an_axis(values: Floats) -> Floats:
+    """Return the median of readings (n, 3), or standard gravity along the axis that is as near as the readings vary.
+
+    The motion is in the median, too, and what it leaves would be taken for a bias.
+    """
+    median = np.asarray(np.median(values, axis=0))
+    axis = int(np.argmax(np.abs(median)))
+    plumb = np.sign(median[axis]) * STANDARD_GRAVITY * np.eye(3)[axis]
+    spread = np.median(np.abs(values - median), axis=0)
+    return plumb if (np.abs(median - plumb) < spread).all() else median
 
 
 def _with_gravity(fixed: str) -> Mistake:
