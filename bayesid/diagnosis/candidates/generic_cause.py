@@ -263,7 +263,7 @@ def _wrenches(
     moments = [(np.asarray(i.environment.time)[chosen], np.asarray(i.body.com)[chosen]) for i in fit.operating[1:3]]
     ends = moments[0][0].max(axis=1)
     parts = []
-    together = count if len(chosen) <= FULL else TOGETHER
+    together = min(count if len(chosen) <= FULL else TOGETHER, max(1, perturbed.most_pushes // 3))
     for numbers in (np.arange(start, min(start + together, count)) for start in range(0, count, together)):
         wrenches = []
         for time, com in moments:

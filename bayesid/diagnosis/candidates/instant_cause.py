@@ -251,7 +251,12 @@ class MassShiftCause(InstantCause):
     name = "mass-shift"
 
     def responses(self, perturbed: PerturbedModel, fit: Fit, effect: Effect, instants: Floats) -> Floats:
-        """Return the responses to unit moments that jump at some instants, from one perturbation for all of them."""
+        """Return the responses to unit moments that jump at some instants, from one perturbation for many of them."""
+        parts = -(-instants.shape[1] // max(1, perturbed.most_pushes // len(effect.parameters)))
+        some = np.array_split(instants, parts, axis=1) if parts > 1 else [instants]
+        return np.concatenate([self._together(perturbed, fit, part) for part in some], axis=1)
+
+    def _together(self, perturbed: PerturbedModel, fit: Fit, instants: Floats) -> Floats:
         tables = []
         for side in (fit.operating.node, fit.operating.sample):
             time = np.asarray(side.environment.time)

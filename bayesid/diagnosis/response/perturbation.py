@@ -59,6 +59,11 @@ class Table(NamedTuple):
     node: Floats
     sample: Floats
 
+    @property
+    def nbytes(self) -> int:
+        """Memory [bytes]."""
+        return self.node.nbytes + self.sample.nbytes
+
 
 def operating_trajectory_of(
     posterior: Posterior, node: Instant, sample: Instant, readings: Readings

@@ -6,7 +6,7 @@ along the motion of the last fit; a few iterations make motion and pushes agree.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -45,6 +45,15 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Fit", "PerturbedModel"]
+
+PUSHES = 2e8
+"""Memory of the pushes whose responses are computed together, of which there are about two copies [bytes]."""
+
+READ = 4
+"""Number of pushes whose changes of the readings take as much memory as one push."""
+
+TABLES = 6e8
+"""Memory of the tables of effects that are kept; those used least recently are computed anew [bytes]."""
 
 ITERATIONS = 25
 
@@ -156,8 +165,9 @@ class Fit:
         return np.asarray(physical(effect, np.reshape(self.coordinates[index], shape)))
 
 
-ONE_AT_A_TIME = Lock()
-"""Held while the simulation is linearised; it belongs to no model, since models are sent to other processes."""
+ONE_AT_A_TIME, TABLE_LOCK = Lock(), Lock()
+"""Held while the simulation is linearised, and while tables come and go; they belong to no model, since models are sent
+to other processes."""
 
 
 class _Point(NamedTuple):
@@ -382,18 +392,30 @@ class PerturbedModel:
         def changes(item: tuple[Effect, Floats]) -> tuple[Floats, Floats]:
             return linear.changes(linear_perturbation(*item, operating, self._table(item[0])))
 
-        raw, offset = zip(*in_threads(changes, effects), strict=True)
-        ends = np.cumsum([len(part) for part in raw])[:-1]
-        whitened = linear.whitened(np.concatenate(raw), np.concatenate(offset))
-        return [part.reshape(len(part), -1).T for part in np.split(whitened, ends)]
+        columns: list[Floats] = []
+        for some in self._shared_out(effects, READ * self.most_pushes):
+            raw, offset = zip(*in_threads(changes, some), strict=True)
+            ends = np.cumsum([len(part) for part in raw])[:-1]
+            whitened = linear.whitened(np.concatenate(raw), np.concatenate(offset))
+            columns += [part.reshape(len(part), -1).T for part in np.split(whitened, ends)]
+        return columns
+
+    @staticmethod
+    def _shared_out(effects: Sequence[tuple[Effect, Floats]], most: int) -> Iterator[Sequence[tuple[Effect, Floats]]]:
+        """Yield effects in groups with about so many coordinates in all."""
+        count = max(1, most // max(coordinates.size for _, coordinates in effects))
+        yield from (effects[first : first + count] for first in range(0, len(effects), count))
 
     def columns_together(
         self, effects: Sequence[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
     ) -> list[Floats]:
-        """Return the same as `columns` from one batch of pushes, which pays where each effect has few parameters."""
-        pushes = in_threads(lambda at: linear_perturbation(*at, operating, self._table(at[0])), effects)
-        whole = self.respond(jax.tree.map(lambda *parts: np.concatenate(parts), *pushes), z, data)
-        return np.split(whole, np.cumsum([len(part.reading) for part in pushes])[:-1], axis=1)
+        """Return the same as `columns` from large batches of pushes, for effects with few parameters each."""
+        columns: list[Floats] = []
+        for some in self._shared_out(effects, self.most_pushes):
+            pushes = in_threads(lambda at: linear_perturbation(*at, operating, self._table(at[0])), some)
+            whole = self.respond(jax.tree.map(lambda *parts: np.concatenate(parts), *pushes), z, data)
+            columns += np.split(whole, np.cumsum([len(part.reading) for part in pushes])[:-1], axis=1)
+        return columns
 
     def respond(
         self, perturbations: Perturbation, z: Floats, data: Arrays, recordings: Sequence[int] | None = None
@@ -427,6 +449,11 @@ class PerturbedModel:
         empty = Perturbation(*(np.zeros((count, recordings or shape[0], *shape[1:])) for shape in whole))
         return empty._replace(**parts)
 
+    @property
+    def most_pushes(self) -> int:
+        """Number of pushes that may be held at once."""
+        return max(1, int(PUSHES / (8.0 * sum(map(np.prod, self._push_shapes())))))
+
     def _pushed(self, perturbations: Sequence[Perturbation]) -> Arrays:
         data = self.posterior.data.arrays
         if not perturbations:
@@ -442,6 +469,13 @@ class PerturbedModel:
         if not effect.uses("table"):
             return None
         key = effect.label, effect.instants  # a label has fewer digits
-        if key not in self._tables:
-            self._tables[key] = tables_of(effect, self.posterior)
-        return self._tables[key]
+        with TABLE_LOCK:
+            table = self._tables.pop(key, None)
+        if table is None:
+            table = tables_of(effect, self.posterior)
+        with TABLE_LOCK:
+            self._tables[key] = table  # the last is the one used most recently
+            held = sum(one.nbytes for one in self._tables.values())
+            while held > TABLES and len(self._tables) > 1:
+                held -= self._tables.pop(next(iter(self._tables))).nbytes
+        return table
