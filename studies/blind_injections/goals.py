@@ -61,7 +61,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     flown = in_basilisk(trials)
     return [
         _rate("false alarms where nothing is hidden", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
-        _least("named causes right where 0.9 and more is stated", 0.93, sum(t.holds for t in sure), len(sure)),
+        _least("verdicts of 0.9 and more that name nothing false", 0.93, sum(t.holds for t in sure), len(sure)),
         _relative(f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit", 0.97, limited),
         _least(f"hidden causes in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
         _least(

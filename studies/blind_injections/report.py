@@ -65,8 +65,8 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     verdicts = [goal.verdict for goal in judged]
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     answer = (
-        f"Of the causes named with a probability of {SURE:g} or more {share_text(right, len(sure))} were hidden; where "
-        f"nothing is hidden {share_text(alarmed, len(nulls))} trials raised an alarm"
+        f"Of the verdicts with a probability of {SURE:g} or more {share_text(right, len(sure))} name nothing false; "
+        f"where nothing is hidden {share_text(alarmed, len(nulls))} trials raised an alarm"
     )
     if any(goal.verdict is Verdict.FAIL and "wrongly explained" in goal.text for goal in judged):
         answer += f"; {_explained_outside(trials)[0]}"

@@ -22,7 +22,7 @@ TERMS = {
     "Laplace": "the normal distribution at the posterior's mode",
     "ln B": "logarithm of the ratio of two models' evidences",
     "NUTS": "Hamiltonian Monte Carlo without U-turns",
-    "rank": "place of the truth among posterior draws",
+    "ranks": "places of the truth among posterior draws",
     "sd": "standard deviation",
     "rms": "root mean square",
 }

@@ -121,7 +121,8 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
 def computation_sentence(result: Diagnosis) -> str:
     """Return how long each phase of the diagnosis took."""
     phases = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.seconds.items())
-    return f"Time by phase: {phases}; {sum(result.seconds.values()):.1f} s in all."
+    total = sum(result.seconds.values())
+    return f"Time by phase: {phases}; {total:.1f} s until the verdict, without sampling and this report."
 
 
 def unseen_rows(rows: Sequence[Candidate]) -> Rows:
