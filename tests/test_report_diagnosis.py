@@ -650,7 +650,7 @@ def test_the_method_states_false_alarms_the_prior_and_the_seed(biased):
     prior = biased.probabilities.prior
     assert f"with a probability of {prior.one_more:g}" in said
     assert "Seed of all random numbers: 3." in said
-    assert f"{sum(biased.seconds.values()):.1f} s in all" in computation_sentence(biased)
+    assert f"{sum(biased.seconds.values()):.1f} s until the verdict" in computation_sentence(biased)
 
 
 def test_the_conditions_name_uncertain_links(biased):

@@ -96,8 +96,8 @@ def _turns(known: Floats, carried: Floats, pushed: Floats) -> tuple[Floats, Floa
         past = with_motion[..., ANGLE][:, np.arange(k, k - far, -1), np.arange(reach, reach + far)]
         among[:, k + 1, 1 : far + 1] = carried[k] @ among[:, k, :far] + gain * past[:, :, None, :]
         cross = carried[k] @ with_motion[:, k, reach, :, ANGLE, None] * pushed[:, k, None, :]
-        own = steps[:, k, reach, ANGLE, None, None] * gain[:, 0] * pushed[:, k, None, :]
-        among[:, k + 1, 0] = carried[k] @ among[:, k, 0] @ carried[k].T + cross + cross.swapaxes(1, 2) + own
+        added = steps[:, k, reach, ANGLE, None, None] * gain[:, 0] * pushed[:, k, None, :]
+        among[:, k + 1, 0] = carried[k] @ among[:, k, 0] @ carried[k].T + cross + cross.swapaxes(1, 2) + added
     return with_motion, among
 
 

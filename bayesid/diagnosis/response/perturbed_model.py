@@ -475,7 +475,7 @@ class PerturbedModel:
             table = tables_of(effect, self.posterior)
         with TABLE_LOCK:
             self._tables[key] = table  # the last is the one used most recently
-            held = sum(one.nbytes for one in self._tables.values())
-            while held > TABLES and len(self._tables) > 1:
-                held -= self._tables.pop(next(iter(self._tables))).nbytes
+            memory = sum(one.nbytes for one in self._tables.values())
+            while memory > TABLES and len(self._tables) > 1:
+                memory -= self._tables.pop(next(iter(self._tables))).nbytes
         return table
