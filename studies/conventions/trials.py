@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._math.kept_jit import forget_executables
 from bayesid.app.convention_remedies import conventions_of, with_remedies
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
@@ -45,7 +46,7 @@ class Outcome:
     expected: tuple[str, ...]
     mended: bool  # whether no convention is wrong once the remedies are written
     visible: bool  # whether the readings that a mistake concerns stand out of their noise
-    seconds: float
+    seconds: float  # processor time of a look, code compiled before: of several, the median
     looks: int = 1  # number of circumstances in which it was looked at
     alarms: int = 0  # number of those of a right study in which something was said
 
@@ -88,7 +89,9 @@ def _sizes(turn: int) -> list[tuple[float, float]]:
 def trial(task: Mapping[str, Any], generator: np.random.Generator) -> dict[str, Any]:
     """Make one study, and return what is said of its conventions."""
     with TemporaryDirectory() as folder:
-        return asdict(_right_study(task, Path(folder)) if "case" in task else _mistaken(task, Path(folder)))
+        outcome = _right_study(task, Path(folder)) if "case" in task else _mistaken(task, Path(folder))
+    forget_executables()  # robots and shapes differ from trial to trial
+    return asdict(outcome)
 
 
 def _right_study(task: Mapping[str, Any], folder: Path) -> Outcome:
@@ -104,7 +107,9 @@ def _right_study(task: Mapping[str, Any], folder: Path) -> Outcome:
         seconds.append(time.process_time() - began)
     names = tuple(name for names in said for name in names)
     robot = model.robot.name if case is None else case.urdf.stem
-    return Outcome(name, False, robot, 0.0, 0.0, names, (), True, True, max(seconds), looks, sum(map(bool, said)))
+    return Outcome(
+        name, False, robot, 0.0, 0.0, names, (), True, True, float(np.median(seconds)), looks, sum(map(bool, said))
+    )
 
 
 def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
@@ -117,11 +122,12 @@ def _mistaken(task: Mapping[str, Any], folder: Path) -> Outcome:
     study = write_study(folder / "study", urdf, draw, sensors=sensors, manoeuvres=manoeuvres)
     file, visible = study.file, _is_visible(study.truths[0], mistake.names, noise)
     mistake.make(file)
-    began = time.process_time()
     conventions = conventions_of(Study.load(file))
-    seconds, said = time.process_time() - began, tuple(convention.name for convention in conventions)
+    said = tuple(convention.name for convention in conventions)
     file.write_text(with_remedies(file.read_text(), [convention.remedy for convention in conventions]))
+    began = time.process_time()
     mended = bool(conventions) and not conventions_of(Study.load(file))
+    seconds = time.process_time() - began
     kind = (task["mistake"], True, task["robot"], task["amplitude"], noise)
     return Outcome(*kind, said, mistake.names, mended, visible, seconds)
 

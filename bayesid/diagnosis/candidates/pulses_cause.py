@@ -31,6 +31,10 @@ still resolve."""
 COMBINED = 48
 """Combinations of first pulses over which the likelihood of a train is averaged."""
 
+WAYS = 2
+"""Ways of beginning, equally probable: at one time of all recordings, where the train starts with what is recorded, or
+in each at a time of its own."""
+
 MOST_ON = 0.5
 """Largest share of the time that it fires; one that fires longer leaks with pauses."""
 
@@ -67,19 +71,20 @@ class PulsesCause(ShapedCause):
         while periods[-1] > longest / FINEST:
             periods.append(periods[-1] * (1.0 - DRIFT * periods[-1] / longest))
         shapes = [(period, duty, sign) for period in periods for duty in DUTIES for sign in (False, True)]
-        tried = [_best_phases(courses, *shape) for shape in shapes]
-        mean = log_sum([log_mean for _, _, log_mean in tried]) - float(np.log(len(tried)))
-        ranked = sorted(((gain, train) for gain, train, _ in tried), key=lambda train: -train[0])
-        log_prior = -float(np.log(len(shapes))) - len(courses.ends) * float(np.log(PHASES))
+        tried = [_phases(courses, *shape) for shape in shapes]
+        mean = log_sum([log_mean for _, log_mean in tried]) - float(np.log(len(tried)))
+        log_shapes = -float(np.log(len(shapes)) + np.log(WAYS))
         proposals = []
-        for gain, train in ranked[:BEST]:
+        for gain, train in (best for both, _ in tried for best in both):
+            count = len(train.first)
             within = train.period * (2.0 if train.alternating else 1.0)
-            first = np.full(len(courses.ends), within)
-            widths = np.concatenate([[periods[0] - periods[-1], MOST_ON * train.period], first])
+            widths = np.array([periods[0] - periods[-1], MOST_ON * train.period, *(within,) * count])
+            log_prior = log_shapes - count * float(np.log(PHASES))
+            log_share = -float(np.log(2.0) + np.log(WAYS))
             proposals.append(
-                ShapeProposal(_of(effect).with_train(train), gain, log_prior, widths, -float(np.log(2.0)), mean - gain)
+                ShapeProposal(_of(effect).with_train(train), gain, log_prior, widths, log_share, mean - gain)
             )
-        return proposals
+        return sorted(proposals, key=lambda proposal: -proposal.worth)[:BEST]
 
     def shape(self, effect: Effect) -> tuple[Floats, Floats]:
         """Return period, width and the first pulses."""
@@ -106,15 +111,18 @@ def _of(effect: Effect) -> ThrusterPulses:
     return cast(ThrusterPulses, effect)
 
 
-def _best_phases(courses: CourseGram, period: float, duty: float, alternating: bool) -> tuple[float, PulseTrain, float]:
-    """Return the gain of a train with the best first pulse in each recording, sought one after another, and the train.
+def _phases(
+    courses: CourseGram, period: float, duty: float, alternating: bool
+) -> tuple[list[tuple[float, PulseTrain]], float]:
+    """Return the trains of one shape whose first pulses gain most, with what they gain, and the mean over first pulses.
 
-    The third number is the logarithm of the mean likelihood over first pulses, on a lattice of `COMBINED` of them.
-
-    With alternating signs the first pulse is sought within two periods, which gives either sign.
+    The first pulse comes at the same time of all recordings, or in each at one of its own, sought one after another.
+    With alternating signs it is sought within two periods, which gives either sign. The mean is the logarithm of that
+    of the likelihoods, either way being as probable; first pulses of their own are averaged over a lattice of
+    `COMBINED` of them.
     """
-    within = period * (2.0 if alternating else 1.0)
-    phases = within * np.arange(PHASES * (2 if alternating else 1)) / (PHASES * (2 if alternating else 1))
+    turns = 2 if alternating else 1
+    phases = period * np.arange(PHASES * turns) / PHASES
     matrices, scores = [], []
     for recording in range(len(courses.ends)):
         times = courses.times(recording)
@@ -125,17 +133,23 @@ def _best_phases(courses: CourseGram, period: float, duty: float, alternating: b
         cosines = courses.cosines(recording, on * signs)
         matrices.append(courses.information(recording, cosines, cosines))
         scores.append(cosines @ courses.score[recording])
-    best = [int(np.argmax(half_chi2(matrix, score))) for matrix, score in zip(matrices, scores, strict=True)]
+    matrix, score = np.stack(matrices, axis=1), np.stack(scores, axis=1)  # (phases, recordings, 3, 3), (..., 3)
+    recordings = range(len(courses.ends))
+    alike = half_chi2(matrix.sum(axis=1), score.sum(axis=1))
+    best = np.full(len(recordings), int(np.argmax(alike)))
+    trains = [(float(alike.max()), PulseTrain(period, duty * period, alternating, (float(phases[best[0]]),)))]
+    if len(recordings) == 1:
+        return trains, log_sum(alike) - float(np.log(len(phases)))
     for _ in range(2):
-        for recording in range(len(best)):
-            others = [r for r in range(len(best)) if r != recording]
-            matrix = matrices[recording] + sum((matrices[r][best[r]] for r in others), np.zeros((3, 3)))
-            score = scores[recording] + sum((scores[r][best[r]] for r in others), np.zeros(3))
-            gains = half_chi2(matrix, score)
+        for recording in recordings:
+            others = [r for r in recordings if r != recording]
+            gains = half_chi2(
+                matrix[:, recording] + matrix[best[others], others].sum(axis=0),
+                score[:, recording] + score[best[others], others].sum(axis=0),
+            )
             best[recording] = int(np.argmax(gains))
-    first = tuple(float(phases[place]) for place in best)
-    lattice = np.arange(COMBINED)[:, None] * (2 * np.arange(len(best)) + 1) % len(phases)
-    matrix = sum((matrices[r][lattice[:, r]] for r in range(len(best))), np.zeros((COMBINED, 3, 3)))
-    score = sum((scores[r][lattice[:, r]] for r in range(len(best))), np.zeros((COMBINED, 3)))
-    log_mean = log_sum(half_chi2(matrix, score)) - float(np.log(COMBINED))
-    return float(gains[best[-1]]), PulseTrain(period, duty * period, alternating, first), log_mean
+    trains.append((float(gains.max()), PulseTrain(period, duty * period, alternating, tuple(phases[best].tolist()))))
+    lattice = np.arange(COMBINED)[:, None] * (2 * np.arange(len(recordings)) + 1) % len(phases)
+    apart = half_chi2(matrix[lattice, recordings].sum(axis=1), score[lattice, recordings].sum(axis=1))
+    means = [log_sum(gains) - float(np.log(len(gains))) for gains in (alike, apart)]
+    return trains, log_sum(means) - float(np.log(WAYS))

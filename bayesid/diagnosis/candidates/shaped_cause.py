@@ -147,7 +147,7 @@ class ShapedCause(CauseKind):
     def refined(
         self, point: Linearisation, weighed: SetProbabilities, effects: Sequence[Effect], bounds: Bounds, least: float
     ) -> Linearisation:
-        """Return the linear model with a tuned form of every cause that is worth it, or the same."""
+        """Return the linear model with tuned forms of every cause that is worth it, or the same."""
         bank, evidence = point.bank, point.evidence
         mine = {effect.label for effect in effects}
         companies = [causes for causes in _companies(weighed, mine) if _something_left(evidence, causes)]
@@ -161,26 +161,33 @@ class ShapedCause(CauseKind):
             tuned = [trial for trial in tuned if trial[2].worth > WORTH]
             if not tuned:
                 continue
-            total, causes, proposal = max(tuned, key=lambda trial: trial[0])
-            if total < likeliest - max(WORTH, LOST * proposal.gain):
-                continue
-            tuning = self._tuned(point, proposal, causes, likeliest - total + proposal.gain)
-            if tuning is None:
-                continue
-            exact, log_share = tuning
             names = [manoeuvre.recording.name for manoeuvre in point.fit.posterior.manoeuvres]
-            label = f"{effect.label} tuned beside {' + '.join(causes) or 'nothing'}"
-            (columns,) = _responses(point.perturbed, point.fit, [exact])
-            items, groups = _form(label, self.with_names(exact, names), columns, bounds[effect.label])
+            forms: list[tuple[AmplitudeGroup, ...]] = []
+            log_shares = []
+            for total, causes, proposal in _best_by_company(tuned):
+                if total < likeliest - max(WORTH, LOST * proposal.gain):
+                    continue
+                tuning = self._tuned(point, proposal, causes, likeliest - total + proposal.gain)
+                if tuning is None:
+                    continue
+                exact, log_share = tuning
+                label = f"{effect.label} tuned beside {' + '.join(causes) or 'nothing'}"
+                (columns,) = _responses(point.perturbed, point.fit, [exact])
+                items, groups = _form(label, self.with_names(exact, names), columns, bounds[effect.label])
+                bank = SignatureBank((*bank.signatures, *items), bank.causes)
+                forms.append(groups)
+                log_shares.append(log_share)
+            if not forms:
+                continue
             cause = next(cause for cause in bank.causes if cause.name == effect.label)
             weights = [(1.0 - SHARE) * float(np.exp(variant.log_weight)) for variant in cause.variants]
             more = replace(
                 cause,
-                others=(*(variant.groups for variant in cause.variants[1:]), groups),
-                shares=(*weights, SHARE * float(np.exp(max(log_share, -200.0)))),
+                others=(*(variant.groups for variant in cause.variants[1:]), *forms),
+                shares=(*weights, *(SHARE * float(np.exp(max(share, -200.0))) / len(forms) for share in log_shares)),
             )
             others = tuple(more if one is cause else one for one in bank.causes)
-            bank = SignatureBank((*bank.signatures, *items), others)
+            bank = SignatureBank(bank.signatures, others)
         return point if bank is point.bank else point.with_bank(bank)
 
     def with_names(self, effect: Effect, names: Sequence[str]) -> Effect:
@@ -282,6 +289,18 @@ class ShapedCause(CauseKind):
             sd = float(np.sqrt(weight @ (steps - mean) ** 2 + (wide / POINTS) ** 2 / 12.0))
             numbers_of_shape.append(CauseAmplitude(quantity, float(numbers[place]) + mean, sd))
         return numbers_of_shape
+
+
+def _best_by_company(
+    tuned: Sequence[tuple[float, tuple[str, ...], ShapeProposal]],
+) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
+    """Return the most probable proposal, and that beside nothing.
+
+    Pulses of either sign beside a leak make those of one sign alone, so that the cause by itself is tuned as well.
+    """
+    best = max(tuned, key=lambda trial: trial[0])
+    alone = [trial for trial in tuned if not trial[1]]
+    return [best] if not best[1] or not alone else [best, max(alone, key=lambda trial: trial[0])]
 
 
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
