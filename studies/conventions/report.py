@@ -49,17 +49,17 @@ def _goals(outcomes: Sequence[Outcome]) -> list[Goal]:
     slowest = max(row.seconds for row in outcomes)
     return [
         Goal(
-            "Right studies with anything hidden: at most 1 in 1,000 said to have a wrong convention",
-            f"{alarms} of {looks}; with 95 % at most {1e3 * _most(alarms, looks):.2g} in 1,000",
+            "Correct studies with any hidden cause: at most 1 in 1,000 reported to have a wrong convention",
+            f"{alarms} of {looks}; with 95 % confidence at most {1e3 * _most(alarms, looks):.2g} in 1,000",
             Verdict.between(*_interval(alarms, looks), most=ALARMS),
         ),
         Goal(
-            "Mistakes in readings that stand out of their noise: 99 % named exactly, and put right by their remedy",
+            "Mistakes in readings that exceed their noise: 99 % named exactly, and corrected by their remedy",
             f"{named} of {len(wrong)}",
             Verdict.between(*_interval(named, len(wrong)), least=NAMED),
         ),
         Goal(
-            "A look takes at most 5 s of a processor, with compiled code kept",
+            "A check takes at most 5 s of processor time, with cached compiled code",
             f"{slowest:.1f} s at most",
             Verdict.of(slowest <= LONGEST),
         ),
@@ -75,7 +75,7 @@ def _figure(outcomes: Sequence[Outcome]) -> Figure:
     axes.barh(range(len(names)), shares, color=AFTER)
     axes.set_yticks(range(len(names)), names)
     axes.set_xlim(0.0, 1.0)
-    axes.set_xlabel("share named exactly and put right")
+    axes.set_xlabel("share named exactly and corrected")
     return figure
 
 
@@ -84,7 +84,7 @@ def _kind(outcome: Outcome) -> list[str | float]:
 
 
 def _by_size(document: Document, outcomes: Sequence[Outcome]) -> None:
-    document.section("Where a mistake can be seen")
+    document.section("Which mistakes can be detected")
     wrong = [row for row in outcomes if row.wrong]
     sizes, noises = (sorted({key(row) for row in wrong}) for key in (_amplitude, _noise))
     rows = []
@@ -94,10 +94,10 @@ def _by_size(document: Document, outcomes: Sequence[Outcome]) -> None:
     document.table(
         ["amplitude [rad]:", *(f"noise {noise:g}:" for noise in noises)],
         rows,
-        "Mistakes named exactly and put right, by the amplitude of the joints and the noise of all sensors (rad/s, "
+        "Mistakes named exactly and corrected, by the amplitude of the joints and the noise of all sensors (rad/s, "
         f"m/s2, rad). Of all {len(wrong)}, {sum(not row.visible for row in wrong)} are in readings whose signal is "
-        f"smaller than {VISIBLE:g} times their noise, of which {sum(row.right for row in wrong if not row.visible)} "
-        "are named all the same.",
+        f"smaller than {VISIBLE:g} times their noise; {sum(row.right for row in wrong if not row.visible)} of these "
+        "are still named.",
     )
 
 
@@ -110,16 +110,16 @@ def _noise(row: Outcome) -> float:
 
 
 def _missed(document: Document, outcomes: Sequence[Outcome]) -> None:
-    document.section("What was missed, and what was said in vain")
+    document.section("Missed mistakes and false reports")
     rows = [
         [row.subject, row.robot, f"{row.amplitude:g}", f"{row.noise:g}", ", ".join(row.said) or "nothing"]
         for row in outcomes
         if (row.wrong and row.visible and not row.right) or (not row.wrong and row.said)
     ]
     if not rows:
-        document.paragraph("Nothing.")
+        document.paragraph("None.")
         return
-    document.table(["study", "robot", "amplitude [rad]:", "noise:", "said"], rows, "Trials that went wrong.")
+    document.table(["study", "robot", "amplitude [rad]:", "noise:", "reported"], rows, "Trials with wrong results.")
 
 
 def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
@@ -127,26 +127,27 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
     full = len(wrong) > 100
     return Report(
         title="Wrong conventions",
-        subtitle="Axes, signs, orders and units that telemetry does not state are named",
-        question="Are the mistakes that people make with telemetry named, and right studies left in peace?",
-        answer=f"Of {len(wrong)} studies with a mistake {sum(row.right for row in wrong)} are put right by what is "
-        f"said; of {sum(row.looks for row in right)} looks at right studies {sum(row.alarms for row in right)} say "
-        "that they are wrong.",
-        valid="Base and arm exchange momentum: no mistake shows where nothing moves, and one in what hardly moves the "
-        "base, or about an axis of symmetry, is told from none or from others only as far as the noise permits.",
+        subtitle="Detection of axes, signs, orders and units that telemetry does not state",
+        question="Are common mistakes in telemetry named, without false reports on correct studies?",
+        answer=f"{sum(row.right for row in wrong)} of {len(wrong)} studies with a mistake are corrected by the "
+        f"reported remedy. {sum(row.alarms for row in right)} of {sum(row.looks for row in right)} checks of correct "
+        "studies report a mistake.",
+        valid="base and arm exchange momentum: no mistake is detectable if nothing moves. For motions that hardly move "
+        "the base, or about an axis of symmetry, the noise limits whether a mistake can be detected and distinguished "
+        "from others.",
         goals=_goals(outcomes),
         full=full,
-        figure=Picture(_figure(outcomes), "Mistakes, and the share that was named exactly and put right."),
+        figure=Picture(_figure(outcomes), "Mistakes, and the share that was named exactly and corrected."),
         setup=Setup(
             robot=f"{', '.join(ROBOTS)} with three and four joints, and in the full run {len(DRAWN)} drawn at random "
             "with two to seven.",
-            manoeuvre="Smooth motions of 60 s, in the full run of three sizes; 150 s where a cause is hidden.",
+            manoeuvre="Smooth motions of 60 s, in the full run of three sizes; 150 s with a hidden cause.",
             sensors=f"Rate, acceleration, attitude and encoders; in the full run with noise of {NOISES}.",
-            known="All links but the base.",
-            unknown="The base, about a guess that is some 10 % wrong.",
-            replicates="Other motions, starts and noise; causes of and outside the catalogue at five strengths; each "
-            "right study with up to ten times the noise, mountings of up to 30 degrees, guesses of the base wrong by "
-            "up to three, and some of its sensors.",
+            known="All links except the base.",
+            unknown="The base, with a guess that is wrong by some 10 %.",
+            replicates="Different motions, starts and noise; causes in and outside the catalogue at five strengths; "
+            "each correct study with up to ten times the noise, mountings of up to 30 degrees, guesses of the base "
+            "wrong by a factor of up to three, and only some of its sensors.",
         ),
         sections=[_by_size, _missed],
         tables=[
@@ -161,7 +162,7 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
 
 STUDY = Study(
     name="conventions",
-    description="Hide mistakes of telemetry and causes of any kind, and count what is said of conventions.",
+    description="Hide mistakes in telemetry and causes of any kind, and count the reports on conventions.",
     full="ten robots, three sizes and noises, and causes of five strengths",
     extra=TRIALS,
     run=run,
