@@ -298,7 +298,7 @@ def test_almost_parallel_joints(tilt, count):
 
 
 def test_no_number_is_given_where_rounding_decides():
-    with pytest.raises(InputError, match=r"cannot be told: 7 or 8.*almost, but not quite, parallel"):
+    with pytest.raises(InputError, match=r"ambiguous: 7 or 8.*almost, but not exactly, parallel"):
         base_parameters(almost_parallel(7e-7), base=Base.FIXED)
 
 

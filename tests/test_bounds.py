@@ -143,7 +143,7 @@ def test_a_user_may_know_better():
     bounds = bounds_by_label(effects, model, {"thruster-leak": [better]})
     assert bounds["thruster-leak"] == (better, effects[0].physical_bounds(model)[1])
     assert bounds["rate-bias"] == effects[1].physical_bounds(model)
-    with pytest.raises(InputError, match="does not occur"):
+    with pytest.raises(InputError, match="is not among the effects"):
         bounds_by_label(effects, model, {"accel-bias": [better]})
     with pytest.raises(InputError, match="stated in 'N'"):
         bounds_by_label(effects, model, {"rate-bias": [better]})

@@ -112,7 +112,7 @@ class OwnAppendage(FlexibleAppendage):
     ("kind", "message"),
     [
         (Breath, r"test_candidates.py: effect 'breath': it is not linear in force, .* Override in_amplitudes"),
-        (Whip, r"test_candidates.py: effect 'whip': a vibration of one's own has no bounds"),
+        (Whip, r"test_candidates.py: effect 'whip': a user-defined vibration has no bounds"),
         (OwnAppendage, None),
     ],
 )

@@ -62,7 +62,7 @@ def test_independent_bodies_follow_the_joint_prior():
 
 
 def test_few_draws_are_an_error():
-    with pytest.raises(InputError, match="79 draws do not give the covariance of 20 coordinates"):
+    with pytest.raises(InputError, match="79 draws are too few for the covariance of 20 coordinates"):
         joint_prior(InertialDraws(NAMES, correlated(79).values))
 
 
@@ -93,7 +93,7 @@ def test_an_uncertain_amount_of_fuel_widens_the_mass():
 
 
 def test_more_fuel_than_there_is_is_an_error():
-    with pytest.raises(InputError, match=r"no physical body is left of load in 400 of 400 draws.* by -6 kg"):
+    with pytest.raises(InputError, match=r"load is no longer a physical body in 400 of 400 draws.* by -6 kg"):
         correlated().changed(BodyChange("load", -6.0, [0.5, 0.0, 0.0]), np.random.default_rng(0))
     with pytest.raises(InputError, match="the mass is 0"):
         BodyChange("load", 0.0, [0.5, 0.0, 0.0])
@@ -201,12 +201,16 @@ def test_a_study_starts_from_an_earlier_posterior(tmp_path):
 @pytest.mark.parametrize(
     ("names", "unknowns", "message"),
     [
-        (("link1",), {}, "posterior.nc: it holds no body 'base_link'. It holds link1"),
+        (("link1",), {}, "posterior.nc: it contains no body 'base_link'. It contains link1"),
         (("base_link",), {"spread": 0.1}, "spread: it contradicts unknowns.posterior"),
         (("base_link",), {"posterior": "none.nc"}, "none.nc: there is no such file"),
-        (("base_link",), {"posterior": str(PLANAR)}, "holds no draws of inertial parameters"),
+        (("base_link",), {"posterior": str(PLANAR)}, "contains no draws of inertial parameters"),
         (("base_link",), {"changes": [{"body": "tank", "mass": 1.0, "com": [0, 0, 0]}]}, "'tank' is not among"),
-        (("base_link",), {"changes": [{"body": "base_link", "mass": -1e4, "com": [0, 0, 0]}]}, "no physical body is"),
+        (
+            ("base_link",),
+            {"changes": [{"body": "base_link", "mass": -1e4, "com": [0, 0, 0]}]},
+            "base_link is no longer a physical body",
+        ),
         (("base_link",), {"changes": [{"body": "base_link", "mass": 0.0, "com": [0, 0, 0]}]}, "the mass is 0"),
     ],
 )

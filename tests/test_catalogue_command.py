@@ -96,9 +96,9 @@ def test_the_command_prints_all_effects_or_one():
     assert all(f"{name}" in output for name in known_effects())
     status, output = run("rate-scale")
     assert status == 0, output
-    assert output.startswith("rate-scale The rate sensor reads too much or too little")
+    assert output.startswith("rate-scale The rate sensor reads too high or too low")
     assert "x, y, z [1]: normal, mean 0, standard deviation 0.03" in output
-    assert "within a tenth of its nominal value" in output
+    assert "within 10 % of its nominal value" in output
     assert "rate-bias" not in output
 
 
@@ -129,8 +129,8 @@ def test_a_sensor_of_ones_own_has_faults(tmp_path, monkeypatch):
     (tmp_path / "field.py").write_text(SENSOR, encoding="utf-8")
     status, output = run("--study", tmp_path / "study.toml")
     assert status == 0, output
-    assert "rate-bias The rate sensor reads a constant" in output
-    assert "magnetic-drift The magnetometer's zero wanders steadily" in output
+    assert "rate-bias The rate sensor reads a constant value" in output
+    assert "magnetic-drift The magnetometer's zero drifts steadily" in output
     assert "x, y, z [T/s]: normal, mean 0, standard deviation 1 × 10⁻⁹" in output
     assert output.count("Needs: [sensors.other.magnetic]") == 6
 

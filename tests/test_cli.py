@@ -223,7 +223,7 @@ BAD = {
     "effect without what it needs": (
         "study",
         lambda text: text.replace('"gravity-gradient"', '"gravity-gradient", "attitude-misalignment"'),
-        ["attitude-misalignment", "cannot act without [sensors.attitude]"],
+        ["attitude-misalignment", "requires [sensors.attitude]"],
     ),
     "position in millimetres": (
         "study",
@@ -266,7 +266,7 @@ def test_one_recording_under_two_names_does_not_count_twice(study: Path, tmp_pat
     edit(file, lambda text: section.sub(lambda own: f"{own[0]}\n{own[0].replace(first.name, 'again.csv')}", text))
     status, text = run("identify", file, "--output", tmp_path / "out")
     assert status == 2, text
-    assert "recordings #2.file: 'again.csv' holds the same as" in text
+    assert "recordings #2.file: 'again.csv' has the same content as" in text
 
 
 @pytest.mark.parametrize("kind", BAD)

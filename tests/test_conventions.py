@@ -167,7 +167,7 @@ def test_numbers_that_diverge_are_one_error_with_a_remedy_and_others_stay_as_the
         ("joint1.sign=-1", "there is no joint1"),
         ("sensors.rate.unit=furlong", "Give 'rad/s'"),
         ("sensors.rate.mounting=[1, 0, 0, 0]", "State it in the study"),
-        ("sensors=3", "names no key"),
+        ("sensors=3", "does not name a key"),
     ],
 )
 def test_an_import_takes_remedies_by_the_keys_of_a_study(remedy: str, message: str) -> None:
@@ -194,7 +194,7 @@ def test_recordings_without_motion_are_refused_and_those_with_a_little_are_not(s
         }
 
     edited(stilled)(file)
-    with pytest.raises(InputError, match="nothing is learnt"):
+    with pytest.raises(InputError, match="contain no information"):
         identify(load_posterior(Study.load(file), window=0))
 
 

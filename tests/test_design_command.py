@@ -110,7 +110,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
         interrupted.setattr(_Descent, "run", stop)
         status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 130
-    assert "goes on from what it has kept" in text
+    assert "resume from the stored results" in text
     assert [item.name for item in (folder / "out").iterdir()] == ["search.json"]
     status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 0, text
@@ -194,8 +194,8 @@ def test_the_report_holds_the_result_and_the_assumptions(made):
         "−y1² + y2² + 3 y3²",
         "white noise of the sensors and the noise of the encoders",
         "each the larger of the one relative to the base",
-        "initial rate, which the manoeuvre does not cause, is left out",
-        "99 % below",
+        "initial rate, which the manoeuvre does not cause, is omitted",
+        "99 % quantile",
     ):
         assert words in text, words
     first, second = content["manoeuvres"]
@@ -253,7 +253,7 @@ def test_limits_that_only_rest_keeps_are_an_error(tmp_path: Path):
     file = write(tmp_path, lambda text: text.replace(limits, "quiet_band = [0.0, 0.5]"))
     status, text = run("design", file, "--output", tmp_path / "out", "--starts", 1, "--iterations", 2)
     assert status == 2, text
-    for word in ("study.toml", "design.limits", "quiet_band", "Loosen"):
+    for word in ("study.toml", "design.limits", "quiet_band", "Relax"):
         assert word in text, text
     assert not list((tmp_path / "out").iterdir()) if (tmp_path / "out").exists() else True
 
@@ -301,10 +301,10 @@ def test_two_effects_are_told_apart_by_hand(tmp_path: Path):
     assert status == 0, text
     content = json.loads((tmp_path / "out" / "design.json").read_text())
     assert [item["criterion"] for item in content["manoeuvres"]] == ["separation"]
-    assert "separation tells rate-bias and rate-scale apart" in " ".join(text.split())
+    assert "separation distinguishes rate-bias and rate-scale" in " ".join(text.split())
     status, text = run("design", file, "--output", tmp_path / "out2", *effort, "--separate", "rate-bias", "rate-bias")
     assert status != 0
-    assert "cannot be told from itself" in " ".join(text.split())
+    assert "cannot be distinguished from itself" in " ".join(text.split())
 
 
 def test_the_expected_probability_is_that_of_simulated_rivals():

@@ -303,7 +303,7 @@ def check_lacks(effect: Effect, hook: str) -> None:
     assert kind.lacks(PLAIN) is None
     assert kind.lacks(poor)
     assert not kind.instances(poor)
-    with pytest.raises(InputError, match=re.escape(f"cannot act without {kind.lacks(poor)}")):
+    with pytest.raises(InputError, match=re.escape(f"requires {kind.lacks(poor)}")):
         poor.extend(effect)
 
 

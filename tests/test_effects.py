@@ -38,7 +38,7 @@ PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / 
 )
 def test_a_model_refuses_an_effect_that_could_not_act(name: str, orbit: Orbit | None, lacking: str):
     robot = Robot.shipped("planar")
-    with pytest.raises(InputError, match=f"{name}' cannot act without {lacking}"):
+    with pytest.raises(InputError, match=f"{name}' requires {lacking}"):
         Model(robot, (Sensor(SensorKind.RATE, White(1e-5)),), (), orbit, (create(name),))
 
 

@@ -111,7 +111,7 @@ def test_events_are_written_as_they_are_read():
 
 @pytest.mark.parametrize("label", ["kicks:0@5", "kicks:noon", "thermal-snap:1@5/4", "thruster-pulses:5,6,0,1"])
 def test_an_event_that_cannot_be_read_is_refused(label):
-    with pytest.raises(InputError, match=r"is no (event|train)"):
+    with pytest.raises(InputError, match=r"is not an? (event|train)"):
         create(label)
 
 

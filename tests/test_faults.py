@@ -60,7 +60,7 @@ FAILING = {
     "table raises": ("table(self, robot, motion, time):\n        return robot.nothing", "AttributeError"),
     "loads shape": ("loads(self, v):\n        return v", "(0,)"),
     "modes raises": ("modes(self, v):\n        return 1 / 0", "ZeroDivisionError"),
-    "friction shape": ("friction(self, v, speed):\n        return v", "is due"),
+    "friction shape": ("friction(self, v, speed):\n        return v", "instead of"),
     "gravity shape": ("gravity_gradient_tensor(self, v, i):\n        return jnp.zeros(3)", "(3, 3)"),
     "made with arguments": ("__init__(self, place, other):\n        pass", "cannot be made"),
 }
@@ -183,7 +183,7 @@ with _reported(), complete_folder(Path({str(tmp_path / "out")!r})) as folder:
     write_json(folder / "large.json", {{"values": list(range(9999))}})
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert "Error: File too large. Free space there" in done.stderr.replace("\n", " "), done.stderr
+    assert "Error: File too large. Free disk space there" in done.stderr.replace("\n", " "), done.stderr
     assert not (tmp_path / "out").exists()
 
 

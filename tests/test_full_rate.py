@@ -29,7 +29,7 @@ def test_a_tone_above_the_blocks_has_its_frequency_and_amplitude():
     (tone,) = seen.tones
     assert tone.frequency == pytest.approx(40.0, abs=0.1)
     assert tone.amplitude == pytest.approx(5e-5, rel=0.15)
-    assert "tone of 40" in seen.remarks[0]
+    assert "tone at 40" in seen.remarks[0]
 
 
 def test_noise_of_another_size_and_colour_is_remarked():

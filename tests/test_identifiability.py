@@ -103,10 +103,10 @@ def direction(names: tuple[str, ...], displacement: list[float], ratio: float) -
     ("displacement", "ratio", "words"),
     [
         ([60.0, 0.0, 2.0, 5.0, 0.0, 0.5], 1.0, "all masses and inertias in proportion (the scale): not learnt"),
-        ([60.0, 0.0, 2.0, 0.0, 0.0, 0.0], 0.01, "mass and inertia of base in proportion: known to 1 %"),
-        ([6.0, 0.0, 0.0, -0.5, 0.0, 0.0], 0.95, "mass of base against mass of arm: cannot be told apart, 95 %"),
+        ([60.0, 0.0, 2.0, 0.0, 0.0, 0.0], 0.01, "mass and inertia of base in proportion: learnt, 1 %"),
+        ([6.0, 0.0, 0.0, -0.5, 0.0, 0.0], 0.95, "mass of base against mass of arm: cannot be distinguished, 95 %"),
         ([0.0, 0.1, 0.5, 0.0, 0.0, 0.0], 0.7, "centre of mass x of base with inertia yy of base: weakly learnt, 70 %"),
-        ([0.0, 0.0, 0.0, 0.1, 0.1, 0.0], 1e-3, "centre of mass x of arm: known to 0.1 %"),
+        ([0.0, 0.0, 0.0, 0.1, 0.1, 0.0], 1e-3, "centre of mass x of arm: learnt, 0.1 %"),
     ],
 )
 def test_words_follow_the_numbers(displacement: list[float], ratio: float, words: str) -> None:

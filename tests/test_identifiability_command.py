@@ -144,7 +144,7 @@ def test_the_report_holds_directions_parameters_and_structure(made: tuple[dict, 
         if np.abs(row).max() < 1e-9
     ]
     assert alone
-    assert f"These stand for themselves: {', '.join(alone)}." in report
+    assert f"The other base parameters are single parameters: {', '.join(alone)}." in report
 
 
 def test_a_study_without_recordings_gets_the_structure_alone(tmp_path: Path) -> None:

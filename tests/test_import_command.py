@@ -245,7 +245,7 @@ def test_joints_of_two_topics_are_one_recording(flown, writer, tmp_path):
         np.testing.assert_allclose(read.series(f"position.{joint}")[1], flown.series(f"position.{joint}")[1], rtol=1e-9)
     status, output = run(bag, *TOPICS, "--joints", "/left", "--output", tmp_path / "both")
     assert status == 2
-    assert "topic /left: the joint 'joint2' is in /joint_states too" in output
+    assert "topic /left: the joint 'joint2' is also in /joint_states" in output
 
 
 def test_a_bag_named_with_a_dot_keeps_its_name(writer, tmp_path):
@@ -388,9 +388,9 @@ def imu_elsewhere(writer: BagWriter) -> None:
     [
         (repeated_stamp, "/imu", 8, "1 message (its stamp repeats that of another message)"),
         (recorded_twice, "/imu", None, "1 message (recorded twice)"),
-        (swapped, "/imu", None, "Put in the order of their stamps: 1."),
+        (swapped, "/imu", None, "Sorted by their stamps: 1."),
         (first_stamps_zero, "/imu", None, "2 messages (the stamp of the header is zero)"),
-        (garbled_stamp, "/imu", 20, "s later than those around it"),
+        (garbled_stamp, "/imu", 20, "s later than the stamps around it"),
         (not_a_number, "/joint_states", 3, "1 message (position of joint2 is nan, not finite)"),
         (infinite_rate, "/imu", 5, "1 message (angular_velocity is 0, inf, 0, not finite)"),
         (short_position, "/joint_states", 6, "1 message (2 values of position for 4 joints)"),
@@ -413,8 +413,8 @@ def test_single_faulty_messages_are_left_out_and_counted(flown, writer, tmp_path
     # a window that the fault lies outside does not see it
     status, output = run(tmp_path / "flight", *TOPICS, "--start", 9.0, "--output", tmp_path / "later")
     assert status == 0, output
-    assert "Left out" not in output
-    assert "in the order" not in output
+    assert "Omitted" not in output
+    assert "Sorted" not in output
 
 
 @pytest.mark.parametrize(
@@ -422,14 +422,14 @@ def test_single_faulty_messages_are_left_out_and_counted(flown, writer, tmp_path
     [
         (in_g, ("/imu", "gravity in g", "m/s2")),
         (zero_stamps, ("/imu", "message 1", "stamp of the header is zero", "136 such messages")),
-        (other_clock, ("/imu", "behind those of /joint_states", "one clock")),
+        (other_clock, ("/imu", "behind those of /joint_states", "the same clock")),
         (slightly_other_clock, ("/imu", "2.7", "ahead of those of /joint_states")),
-        (clock_set_back, ("/joint_states", "faulty messages of 113", "--most-faulty")),
-        (half_lost, ("/joint_states", "message 1", "joint2 is nan", "57 faulty messages of 113", "--most-faulty")),
+        (clock_set_back, ("/joint_states", "of 113 messages are faulty", "--most-faulty")),
+        (half_lost, ("/joint_states", "message 1", "joint2 is nan", "57 of 113 messages are faulty", "--most-faulty")),
         (moved_frame, ("/imu", "'imu_link', 'other_imu'")),
         (measures_nothing, ("/imu", "neither angular velocity nor acceleration")),
-        (no_unit_quaternion, ("/star", "message 3", "norm is 0", "1 faulty messages of 31")),
-        (imu_elsewhere, ("/imu", "no time in common with /joint_states")),
+        (no_unit_quaternion, ("/star", "message 3", "norm is 0", "1 of 31 messages are faulty")),
+        (imu_elsewhere, ("/imu", "does not overlap in time with /joint_states")),
     ],
 )
 def test_messages_that_make_no_recording_are_refused(
@@ -450,8 +450,8 @@ def test_messages_that_make_no_recording_are_refused(
         (("--joints", "/imu", "--attitude", "/star"), ("its messages are sensor_msgs/Imu", "sensor_msgs/JointState")),
         (("--joints", "/joint_states"), ("no sensor of the base is named", "--imu")),
         (("--joints", "/joint_states", "--imu", "/joint_states"), ("one topic is named twice",)),
-        ((*TOPICS, "--without", "hand"), ("no joint 'hand' to leave out", "joint1")),
-        ((*TOPICS, "--effort"), ("hold no efforts", "--effort")),
+        ((*TOPICS, "--without", "hand"), ("no joint 'hand' to omit", "joint1")),
+        ((*TOPICS, "--effort"), ("contain no efforts", "--effort")),
     ],
 )
 def test_wrong_topics_are_refused(writer, tmp_path, arguments, words):
@@ -502,7 +502,7 @@ def test_speeds_of_wheels_come_from_joint_states_and_from_plain_numbers(flown, w
     wheels = "--wheels", "/wheels", "--wheels", "w3=/third"
     status, output = run(bag, *TOPICS, *wheels, "--output", tmp_path / "out")
     assert status == 0, output
-    assert "Taken as the speed in rad/s of w1, w2." in output
+    assert "Interpreted as speed in rad/s of w1, w2." in output
     read = Recording.read(tmp_path / "out" / "flight.csv")
     assert read.wheels == ("w1", "w2", "w3")
     assert set(read.joints) == set(flown.joints)

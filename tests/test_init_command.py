@@ -133,7 +133,7 @@ def test_a_sensor_that_only_some_recordings_have_is_left_out(flown, tmp_path):
     rest = {column: values for column, values in read.channels.items() if not column.startswith("attitude")}
     Recording(read.name, None, read.time, rest).write(files[2])
     assert set(drafted(files, tmp_path / "study.toml")["sensors"]) == {"rate", "accel", "encoder"}
-    assert "since manoeuvre-2 lacks it" in (tmp_path / "study.toml").read_text(encoding="utf-8")
+    assert "because manoeuvre-2 lacks it" in (tmp_path / "study.toml").read_text(encoding="utf-8")
 
 
 def test_joints_recorded_by_speed_alone_get_a_start(flown, tmp_path):
@@ -191,7 +191,7 @@ def noisy_rate(files: list[Path]) -> None:
     [
         (
             renamed("position.joint2", "position.wrist"),
-            ("no position or velocity of joint joint2", "joint wrist is not"),
+            ("no position or velocity for joint joint2", "joint wrist is not"),
         ),
         (without_base_sensors, ("no sensor of the base is in all recordings", "manoeuvre-1")),
         (in_degrees, ("outside the joint's limits", "radians, not degrees")),

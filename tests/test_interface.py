@@ -47,7 +47,7 @@ def test_a_command_has_the_defaults_of_its_function(name):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_what_is_no_study_is_an_error_that_says_so(name, tmp_path):
     more = (tmp_path / "loop",) if name == "loop" else ()
-    with pytest.raises(bayesid.InputError, match="a dict is no study"):
+    with pytest.raises(bayesid.InputError, match="a dict is not a study"):
         getattr(bayesid, name)({"robot": "robot.urdf"}, *more)
 
 

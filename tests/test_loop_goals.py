@@ -61,9 +61,9 @@ def test_a_standard_deviation_is_that_of_its_draws():
         assert goal.value(knowledge()) == pytest.approx(0.01 * (1.0 + index), rel=0.05)
         assert (goal.unit, goal.text) == (unit, f"sd of base_link.{name}")
         assert [goal.reached(value) for value in (0.04, 0.05, 0.06)] == [True, True, False]
-    with pytest.raises(InputError, match="'colour' is no quantity of a body"):
+    with pytest.raises(InputError, match="'colour' is not a quantity of a body"):
         QuantitySd("base_link", "colour", 0.1)
-    with pytest.raises(InputError, match="'link9' is no body to identify"):
+    with pytest.raises(InputError, match="'link9' is not a body to identify"):
         QuantitySd("link9", "mass", 0.1).value(knowledge())
 
 
@@ -78,7 +78,7 @@ def test_a_cause_is_decided_either_way():
         True,
     ]
     assert goal.value(knowledge(causes={"payload:link2": 0.3})) == 0.3
-    with pytest.raises(InputError, match="'payload:link2' is no candidate of the diagnosis"):
+    with pytest.raises(InputError, match="'payload:link2' is not a candidate of the diagnosis"):
         goal.value(knowledge(causes={"unknown": 0.3}))
 
 
@@ -159,7 +159,7 @@ def test_a_loop_stops_where_its_model_is_wrong(tmp_path: Path):
     assert reviewed == ["step-1-recording", "step-2-recording"]
     text = list(loop_sentences(history))
     assert "Step 2: the recordings so far are explained: payload:link2 (98 %)." in text
-    assert "The model is wrong: after 2 manoeuvres the recordings show payload:link2. The loop stops." in text
+    assert "The model is wrong: after 2 manoeuvres, the recordings indicate payload:link2. The loop stops." in text
     # even where what is wanted is reached: it would be known well of the wrong model
     again = loop_of(FINE, WRONG, goals=(RelativePrecision(1.0),)).run(Still(), tmp_path)
     assert (again.status, len(again.steps)) == ("wrong-model", 2)

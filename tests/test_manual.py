@@ -113,6 +113,16 @@ def test_every_key_of_a_check_is_explained(kind):
     assert {field.name for field in dataclasses.fields(kind)} <= results()
 
 
+def test_the_manual_explains_messages_that_the_program_has():
+    chapter = (ROOT / "studies" / "manual" / "help.typ").read_text(encoding="utf-8")
+    tables = chapter[chapter.index("== Warnings") : chapter.index("== Questions")]
+    messages = re.findall(r"^  \[`([^`]*)`\],", tables, flags=re.MULTILINE)
+    code = "\n".join(file.read_text(encoding="utf-8") for file in sorted((ROOT / "bayesid").rglob("*.py")))
+    code = re.sub(r'"\s*\n\s*f?"', "", code)  # literals over several lines
+    assert len(messages) >= 12
+    assert [part for message in messages for part in message.split(" … ") if part not in code] == []
+
+
 def test_the_release_notes_have_the_version(text):
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     assert f"Manual of bayesid {version}" in text

@@ -103,7 +103,7 @@ def test_what_cannot_fit_is_refused_before_it_is_allocated(three: Posterior, mon
     assert kept / 3.0 < needed < 30.0 * kept
     assert posterior_memory(three.model, three.data.recorded[:1]) < needed
     monkeypatch.setattr(memory, "free_memory", lambda: 0.5 * needed)
-    with pytest.raises(InputError, match=r"GB of memory, and .* GB are free.*fewer or shorter recordings"):
+    with pytest.raises(InputError, match=r"GB of memory, but .* GB are free.*fewer or shorter recordings"):
         Posterior.of(three.model, three.manoeuvres, step=0.5)
 
 

@@ -212,9 +212,9 @@ def test_instants_are_written_after_the_name():
     assert MassShift().jumps(40.0) == (20.0,)
     with pytest.raises(InputError, match="there are more recordings"):
         effect.in_recording(2)
-    with pytest.raises(InputError, match="none is named"):
+    with pytest.raises(InputError, match="no recording is named"):
         effect.jumps(40.0)
-    with pytest.raises(InputError, match="no list of instants"):
+    with pytest.raises(InputError, match="not a list of instants"):
         create("mass-shift:link2")
 
 

@@ -232,11 +232,11 @@ TARGET = '<body name="target"><freejoint/><inertial pos="0 0 0" mass="1" diagine
         (
             'type="slide" axis="0 0 1" range="-0.1 0.3"',
             'type="ball" range="0 90"',
-            ("'ball'", "joint extend", "hinges or slides"),
+            ("'ball'", "joint extend", "hinges or prismatic joints"),
         ),
         ("</worldbody>", TARGET, ("2 bodies", "target")),
         ("<worldbody>", '<include file="arm.xml"/><worldbody>', ("arm.xml", "MuJoCo cannot read")),
-        ('<freejoint name="floating"/>', '<joint axis="1 0 0"/>', ("body bus", "a hinge joins it to the world")),
+        ('<freejoint name="floating"/>', '<joint axis="1 0 0"/>', ("body bus", "a hinge connects it to the world")),
         (
             "</mujoco>",
             '<equality><connect body1="tool" body2="panel" anchor="0 0 0"/></equality></mujoco>',

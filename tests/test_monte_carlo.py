@@ -153,9 +153,9 @@ def test_a_line_that_was_cut_off_is_made_again(tmp_path):
 @pytest.mark.parametrize(
     ("function", "tasks", "seed", "message"),
     [
-        (other, range(3), 5, "holds trials of .*draw.* not of .*other.*give another file"),
+        (other, range(3), 5, "contains trials of .*draw.* not of .*other.*give another file"),
         (draw, range(3), 6, "'seed': 5.* not of .*'seed': 6.*give another file"),
-        (draw, [0, 7, 2], 5, "trial 1 of another plan, 1 in place of 7; give another file"),
+        (draw, [0, 7, 2], 5, "trial 1 of another plan, 1 instead of 7; give another file"),
     ],
     ids=["function", "seed", "task"],
 )
@@ -197,7 +197,7 @@ def test_a_trial_that_raises_is_recorded_and_tried_again(tmp_path):
     assert first.results == [1, None]
     assert first.failures == {1: f"FileNotFoundError: {tasks[1]} is absent"}
     assert "1 failed" in told[-1]
-    with pytest.raises(RuntimeError, match="1 of 2 trials failed, the first of them number 1: FileNotFoundError"):
+    with pytest.raises(RuntimeError, match="1 of 2 trials failed, the first is number 1: FileNotFoundError"):
         first.complete()
     Path(tasks[1]).touch()
     assert run_trials(fragile, tasks, store).complete() == [1, 1]
@@ -222,5 +222,5 @@ def test_an_interruption_says_what_is_kept(tmp_path):
     store, told = tmp_path / "trials.jsonl", []
     with pytest.raises(KeyboardInterrupt):
         run_trials(impatient, range(4), store, progress=told.append)
-    assert told[-1] == f"The trials were interrupted. 2 of 4 are kept in {store}; run again to go on."
+    assert told[-1] == f"The trials were interrupted. {store} contains 2 of 4; run again to resume."
     assert [json.loads(line)["result"] for line in store.read_text().splitlines()[1:]] == [0, 1]

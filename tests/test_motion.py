@@ -124,8 +124,8 @@ def test_lag_covariance_stacks_the_joints():
 @pytest.mark.parametrize(
     ("drop", "add", "message"),
     [
-        (("slide",), (), r"no position or velocity of joint slide"),
-        ((), ("finger",), r"joint finger is not one of the robot's"),
+        (("slide",), (), r"no position or velocity for joint slide"),
+        ((), ("finger",), r"joint finger is not a joint of the robot"),
         (("wrist", "hinge"), ("finger",), r"joint (wrist, hinge|hinge, wrist); joint finger is not"),
     ],
 )
@@ -180,7 +180,7 @@ def test_a_base_does_not_whirl_but_a_reading_may_be_garbled(slow_arm):
     channels = {"position.joint1": SLOW, "position.joint2": SLOW, **rates}
     refuse_impossible_motion(Recording("garbled", None, OFTEN, channels), slow_arm)
     channels["rate.y"] = np.degrees(rate) * 3600.0
-    with pytest.raises(InputError, match=r"column rate.y: half of the readings are beyond \d+ rad/s.*arcseconds"):
+    with pytest.raises(InputError, match=r"column rate.y: half of the readings exceed \d+ rad/s.*arcseconds"):
         refuse_impossible_motion(Recording("arcseconds", None, OFTEN, channels), slow_arm)
 
 
@@ -210,7 +210,7 @@ def test_a_motion_is_extended_by_a_few_samples_at_most(change, end, allowed):
     if allowed:
         motion.check_extent(end, "test")
         return
-    with pytest.raises(InputError, match=r"test: joint 'joint2': its samples are from [02] s to [\d.]+ s") as caught:
+    with pytest.raises(InputError, match=r"test: joint 'joint2': its samples cover [02] s to [\d.]+ s") as caught:
         motion.check_extent(end, "test")
     assert f"needed from 0 s to {end:g} s" in caught.value.problem
 
@@ -221,7 +221,7 @@ def test_a_recording_whose_joints_end_long_before_its_sensors_is_refused(planar_
     cut = replace(given, channels={**given.channels, "position.joint2": short})
     model = planar_case.posterior.model
     manoeuvre = Manoeuvre(cut, MeasuredMotion.from_recording(cut, model.robot, sigma={0: 1e-6}))
-    with pytest.raises(InputError, match=r"planar: joint 'joint2': its samples are from 0 s to 30 s"):
+    with pytest.raises(InputError, match=r"planar: joint 'joint2': its samples cover 0 s to 30 s"):
         RecordedSamples.of(model, manoeuvre)
 
 

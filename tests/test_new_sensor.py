@@ -202,7 +202,7 @@ def test_it_has_the_faults_of_all_sensors(flown):
         assert (names, set(units), set(sigmas)) == (names, {expected[name][1]}, {expected[name][2]})
         assert effect.parameters == create(name).parameters
     assert set(faults) == set(expected)
-    assert faults["gyro2-bias"].summary == "The second gyro reads a constant beside what it measures."
+    assert faults["gyro2-bias"].summary == "The second gyro reads a constant value in addition to what it measures."
     assert "sun sensor" in faults["sun-clock"].summary
 
 

@@ -133,8 +133,8 @@ def test_sizes_may_differ_between_axes(planar_case):
 @pytest.mark.parametrize(
     ("line", "problem", "remedy"),
     [
-        ('"rate-nois" = { factor = 2.0 }', "unknown fault of the noise 'rate-nois'", "rate-noise"),
-        ('"attitude-noise" = { factor = 2.0 }', "unknown fault of the noise 'attitude-noise'", "Choose from"),
+        ('"rate-nois" = { factor = 2.0 }', "unknown noise fault 'rate-nois'", "rate-noise"),
+        ('"attitude-noise" = { factor = 2.0 }', "unknown noise fault 'attitude-noise'", "Choose from"),
         ('"coloured-noise:rate" = { sigma = 1e-5 }', "got sigma", "Give sigma and time"),
         ('"coloured-noise:rate" = { sigma = 1e-5, time = [1.0, 2.0] }', "got {", "Give a number"),
         ('"accel-noise" = { factor = [1.0, 2.0] }', "got {", "or one for each axis"),

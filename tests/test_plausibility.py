@@ -42,11 +42,11 @@ def test_an_angle_that_is_not_wrapped_stays_as_it_is():
 
 def test_a_limited_joint_that_jumps_by_a_turn_is_refused():
     wrapped = np.mod(ANGLE + np.pi, 2.0 * np.pi) - np.pi
-    with pytest.raises(InputError, match=r"column position.joint1: the angle jumps by a turn at time .*unwrap"):
+    with pytest.raises(InputError, match=r"column position.joint1: the angle jumps by a full turn at time .*unwrap"):
         unwrapped(flown(wrapped), LIMITED)
 
 
-@pytest.mark.parametrize(("count", "words"), [(1, "1 of 600 samples are garbled"), (200, "radians, not degrees")])
+@pytest.mark.parametrize(("count", "words"), [(1, "1 of 600 samples are corrupted"), (200, "radians, not degrees")])
 def test_a_garbled_reading_is_told_from_a_wrong_unit(count, words):
     angle = 0.1 * np.sin(0.1 * TIME)
     angle[100 : 100 + count] = 57.0

@@ -168,7 +168,8 @@ def test_simulate_reads_a_plan(plan: Path, tmp_path: Path) -> None:
     assert status == 0, text
     _, exact = Recording.read(tmp_path / "exact" / "plan.csv").vector("rate")
     assert (rate - exact).std() == pytest.approx(1e-5, rel=0.3)
-    assert "without noise and, drawn as measured, as they are written" in PdfText.read(tmp_path / "out" / "report.pdf")
+    report = PdfText.read(tmp_path / "out" / "report.pdf")
+    assert "without noise, and as written to the file (drawn as measured)" in report
 
 
 def test_predict_writes_a_pose_with_its_region(plan: Path, tmp_path: Path) -> None:
@@ -212,5 +213,5 @@ def test_a_plan_without_a_joint_or_a_frame_is_an_error(plan: Path, tmp_path: Pat
     (tmp_path / "plan.csv").write_text("\n".join(",".join(row[:2]) for row in rows) + "\n")
     status, text = run("predict", plan, "--output", tmp_path / "out")
     assert status == 2
-    assert "no position or velocity of joint joint2" in text
+    assert "no position or velocity for joint joint2" in text
     assert not (tmp_path / "out").exists()

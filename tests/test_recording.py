@@ -157,7 +157,7 @@ WRONG_CSV = {
     "semicolons": (csv_text("time;position.j1"), ["unknown column", "Separate the columns by commas"]),
     "axis missing": (csv_text("time,accel.x,accel.z"), ["'accel.y' is missing", "accel.x, accel.y, accel.z"]),
     "w missing": (csv_text("time,attitude.x,attitude.y,attitude.z"), ["column 'attitude.w' is missing"]),
-    "nan": (csv_text(line7="2.5,NaN,0,0,0"), ["column 'position.j1', line 7", "'NaN'", "Leave the cell empty"]),
+    "nan": (csv_text(line7="2.5,NaN,0,0,0"), ["column 'position.j1', line 7", "'NaN'", "Use an empty cell"]),
     "inf": (csv_text(line3="0.5,0,-inf,0,0"), ["column 'rate.x', line 3", "'-inf' is not a finite number"]),
     "text": (csv_text(line11="4.5,0,0,0,n/a"), ["column 'rate.z', line 11", "'n/a' is not a finite number"]),
     "no time stamp": (csv_text(line4=",0,0,0,0"), ["column 'time', line 4", "the time is missing"]),
@@ -302,9 +302,9 @@ def test_calendar_times_of_a_csv_are_counted_from_the_first(tmp_path):
 @pytest.mark.parametrize(
     ("times", "words"),
     [
-        (1e3 * 0.1 * np.arange(ROWS), ("100 s apart", "milliseconds", "divide the times by 1000")),
-        (1e6 * 0.1 * np.arange(ROWS), ("100000 s apart", "microseconds", "divide the times by 1e+06")),
-        (1e9 * 0.1 * np.arange(ROWS), ("1e+08 s apart", "nanoseconds", "divide the times by 1e+09")),
+        (1e3 * 0.1 * np.arange(ROWS), ("between rows is 100 s", "milliseconds", "divide the times by 1000")),
+        (1e6 * 0.1 * np.arange(ROWS), ("between rows is 100000 s", "microseconds", "divide the times by 1e+06")),
+        (1e9 * 0.1 * np.arange(ROWS), ("between rows is 1e+08 s", "nanoseconds", "divide the times by 1e+09")),
         (1.7e9 + 0.1 * np.arange(ROWS), ("count of seconds since 1970", "subtract the first time")),
         (1.7e12 + 100.0 * np.arange(ROWS), ("count of milliseconds since 1970", "divide by 1000")),
         (1.7e18 + 1e8 * np.arange(ROWS), ("count of nanoseconds since 1970", "divide by 1e+09")),

@@ -94,7 +94,7 @@ def test_every_shipped_robot_loads():
         assert robot.name == name
         assert robot.joints
         assert robot.link(robot.base).inertial.is_extended
-    with pytest.raises(InputError, match=r"no shipped robot 'getex'. Choose one of ets7, planar"):
+    with pytest.raises(InputError, match=r"no built-in robot 'getex'. Choose one of ets7, planar"):
         Robot.shipped("getex")
 
 
@@ -201,7 +201,7 @@ def test_names_must_exist_and_be_free():
         robot.with_inertial("arm", LOAD)
     with pytest.raises(InputError, match="no link or load named 'arm'"):
         robot.with_load(Load("load", "arm", LOAD))
-    with pytest.raises(InputError, match="the name 'link1' is taken"):
+    with pytest.raises(InputError, match="the name 'link1' is already used"):
         robot.with_load(Load("link1", "link2", LOAD))
 
 

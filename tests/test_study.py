@@ -261,10 +261,14 @@ WRONG = {
         "eccentricity = 0.2",
         "orbit: the perigee, radius (1 - eccentricity) = 5.5328e+06 m",
     ),
-    "band": ("[0.1, 0.3]", "[0.3, 0.1]", "design.limits.quiet_band: [0.3, 0.1] does not ascend"),
+    "band": ("[0.1, 0.3]", "[0.3, 0.1]", "design.limits.quiet_band: [0.3, 0.1] is not ascending"),
     # units
     "kilometres": ("6.916e6", "6916.0", "orbit.radius: 6916 m is inside the Earth. Metres, not kilometres?"),
-    "millimetres": ("6.916e6", "6.916e9", "orbit.radius: 6.916e+09 m is no orbit about the Earth. Metres, not milli"),
+    "millimetres": (
+        "6.916e6",
+        "6.916e9",
+        "orbit.radius: 6.916e+09 m is not an orbit about the Earth. Metres, not millimetres?",
+    ),
     "degrees": (
         "inclination = 0.6",
         "inclination = 35.0",
@@ -365,7 +369,7 @@ WRONG = {
     "name twice": (
         "../other/manoeuvre-2.parquet",
         "../other/manoeuvre-1.parquet",
-        "recordings #2.file: the name 'manoeuvre-1' is that of two files, '",
+        "recordings #2.file: the name 'manoeuvre-1' is shared by two files, '",
     ),
     "spread of": (
         "{load = 0.5}",
@@ -484,10 +488,10 @@ def test_the_examples_load(case):
 
 
 PLACED = {
-    "eccentric": ({}, "'gravity-gradient' depends on where on the orbit"),
+    "eccentric": ({}, "'gravity-gradient' depends on the orbital position"),
     "dipole": (
         {"= 0.01\ninc": "= 0.0\ninc", '"gravity-gradient"': '"magnetic-dipole"'},
-        "'magnetic-dipole' depends on where on the orbit",
+        "'magnetic-dipole' depends on the orbital position",
     ),
     "circular": ({"= 0.01\ninc": "= 0.0\ninc"}, "there is no such file"),
 }

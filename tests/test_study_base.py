@@ -61,7 +61,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     for words in (
         "It weighs 3.1 kg.",
         "More on 3.1 kg.",
-        "Tables beside this report: weighing-all.csv.",
+        "Tables with this report: weighing-all.csv.",
         "How heavy is it?",
         "the arm is known.",
         "not run in full",

@@ -205,7 +205,7 @@ def test_a_verdict_is_shown_with_its_record(monkeypatch):
     shares = {status.value: Share(9, 10) for status in Status} | {"unresolved": Share(0, 0)}
     shares |= {"quiet": Share(20, 20), "loud": Share(7, 8)}
     monkeypatch.setattr("bayesid.report.verdict_record.shipped_record", lambda: shares)
-    assert "9 of 10 (55 to 100 %) named nothing but what was hidden" in record_sentence(Status.EXPLAINED)
+    assert "9 of 10 (55 to 100 %) named only injected causes" in record_sentence(Status.EXPLAINED)
     assert "20 of 20 (83 to 100 %) raised no alarm" in record_sentence(Status.ADEQUATE)
     assert "7 of 8 (47 to 100 %) raised one" in record_sentence(Status.ADEQUATE)
     assert record_sentence(Status.UNRESOLVED) is None

@@ -85,7 +85,7 @@ def test_intervals_that_are_too_narrow_fail_and_what_was_not_run_is_not_tested()
     def verdicts(made):
         return {goal.text: goal.verdict for goal in goals_of(made)}
 
-    ninety = "90 % intervals hold that share of truths in every case"
+    ninety = "90 % intervals contain that share of the true values in every case"
     right = [made_up(case, planned, 1.0) for case, planned in REPLICATES.items()]
     assert verdicts([])[ninety] is Verdict.NOT_TESTED
     assert verdicts(right)[ninety] is Verdict.PASS

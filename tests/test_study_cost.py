@@ -71,7 +71,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     assert "more than 1000: 46 candidates" in goals[6].reached  # 100 s for each of 46 over 4.6 s
     STUDY.write(cost, tmp_path / "cost.pdf")
     text = PdfText.read(tmp_path / "cost.pdf")
-    assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
+    assert "10 times above that bound" in text  # 200 µs over 6e5 operations at 3e10 a second
     assert "5 s (nothing, leak, payload and link), missed by 2 of 4" in text
     assert "5 of 13 goals are missed" in text
     assert "The files of check, identify and design state no time by phase" in text
@@ -87,7 +87,7 @@ def test_times_of_an_earlier_run_stand_beside_these(tmp_path: Path) -> None:
     STUDY.write(now, tmp_path / "cost.pdf")
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "check 5.0 2.0 −60" in text
-    assert "All that is not listed lies within 10 % of the run that wrote earlier-runs.csv" in text
+    assert "All others are within 10 % of the run that wrote earlier-runs.csv" in text
     assert "start 0.5, load 1.5" in text
     assert broken_rules(tmp_path / "cost.pdf") == []
 

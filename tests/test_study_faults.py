@@ -61,15 +61,15 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     ]
     STUDY.write(Result(made, ["a trial broke"]), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
-    assert text.row("No unclear answer to a spoilt file", "1 of 7; 4 refused, 2 accepted", "FAIL")
+    assert text.row("No unclear answer to a corrupted file", "1 of 7; 4 refused, 2 accepted", "FAIL")
     assert text.row("a full disk: one clear error", "refused", "PASS")
     closed = "a folder that cannot be written: one clear error"
-    assert text.row(closed, "not tried; see tests/test_faults.py", "NOT TESTED")
-    assert text.row("Nothing half written after a kill", "1 file after 2 kills", "FAIL")
-    assert text.row("design: same answer after kills", "2 kills", "FAIL")
-    assert text.row("loop: same answer after kills", "0 kills", "NOT TESTED")
-    unmoved = "a cache of another version: no effect"
-    assert text.row(unmoved, "not tried; a damaged file of it: tests/test_kept_jit.py", "NOT TESTED")
+    assert text.row(closed, "not run; see tests/test_faults.py", "NOT TESTED")
+    assert text.row("No partly written file after a kill", "1 file after 2 kills", "FAIL")
+    assert text.row("design: same result after kills", "2 kills", "FAIL")
+    assert text.row("loop: same result after kills", "0 kills", "NOT TESTED")
+    unmoved = "cache of another version: no effect"
+    assert text.row(unmoved, "not run; for a damaged cache file see tests/test_kept_jit.py", "NOT TESTED")
     for part in ("KeyError", "not refused", "other files", "a trial broke"):
         assert part in text
 
@@ -77,16 +77,16 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
 @pytest.mark.parametrize(
     ("same", "differs", "reached", "verdict"),
     [
-        (True, True, "same answer as with an empty cache; the other version answers otherwise", "PASS"),
-        (False, True, "another answer than with an empty cache; the other version answers otherwise", "FAIL"),
-        (True, False, "the other version itself gives the same answer", "NOT TESTED"),
+        (True, True, "same result as with an empty cache; the other version gives another result", "PASS"),
+        (False, True, "different result than with an empty cache; the other version gives another result", "FAIL"),
+        (True, False, "not decisive: the other version gives the same result", "NOT TESTED"),
     ],
 )
 def test_another_cache_passes_only_where_it_could_have_failed(same, differs, reached, verdict, tmp_path):
     made = [{"cache": "another version", "same": same, "differs": differs}]
     STUDY.write(Result(made, []), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
-    assert text.row("a cache of another version: no effect", reached, verdict)
+    assert text.row("cache of another version: no effect", reached, verdict)
 
 
 def test_the_small_study_is_a_part_of_the_full_one():

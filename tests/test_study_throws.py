@@ -87,7 +87,7 @@ def test_differences_from_the_stated_moments_are_decided_by_their_scatter(error,
 
 
 def test_absent_measurements_are_named(tmp_path):
-    with pytest.raises(InputError, match=r"the throws are not here: no truth.json. Give the folder"):
+    with pytest.raises(InputError, match=r"the measured throws are missing: no truth.json. Give the folder"):
         run(tmp_path)
     with pytest.raises(InputError, match="no throws of 'A'"):
         read_throws(tmp_path, "A", Timing())

@@ -33,12 +33,12 @@ def test_misses_come_first_and_unknown_studies_are_not_lost(tmp_path):
         (tmp_path / f"{name}.pdf").touch()
     write_validation(tmp_path, tmp_path / "validation.pdf")
     text = PdfText.read(tmp_path / "validation.pdf")
-    assert "Of 5 goals 1 are met and 1 are missed." in text
+    assert "1 of 5 goals are met, and 1 are missed." in text
     assert "missed by novel (1)" in text
     assert "So. (Not run in full.)" in text
     assert "older: reports without a summary" in text
     assert text.row(
-        "none", "Walkers and trials per second on a GPU against two cores", "no GPU was at hand", "NOT TESTED"
+        "none", "Walkers and trials per second on a GPU against two cores", "no GPU was available", "NOT TESTED"
     )
     whole = " ".join(" ".join(text.pages).split())
     places = [whole.index(f"goal {verdict.value} 1 %") for verdict in (Verdict.FAIL, Verdict.OPEN, Verdict.PASS)]

@@ -186,7 +186,7 @@ def test_bad_torque_sensors_are_refused(formula_motion):
         TorqueSensor(("joint1",), (0.0,))
     with pytest.raises(InputError, match="no moving joint named 'elbow'"):
         TorqueSensor(("elbow",), (0.1,)).columns(robot)
-    with pytest.raises(InputError, match=r"encoder-offset:joint1.*not carried"):
+    with pytest.raises(InputError, match=r"encoder-offset:joint1.*not modelled"):
         posterior_of(urdf, truth, motion, effects=(EncoderOffset("joint1"),))
     with pytest.raises(InputError, match=r"joint-friction:joint2.*not measured"):
         posterior_of(urdf, truth, motion, joints=("joint1",), effects=(JointFriction("joint2"),))

@@ -99,7 +99,7 @@ def test_a_prior_needs_a_width(spread, message):
 
 def test_a_prior_needs_a_body_with_volume():
     rod = InertialParameters(2.0, np.zeros(3), np.diag([0.0, 1.0, 1.0]))
-    with pytest.raises(InputError, match=r"link rod: the prior of rod centres on a body without extent \(mass 2 kg\)"):
+    with pytest.raises(InputError, match=r"rod: the prior of rod is centred on a body without extent \(mass 2 kg\)"):
         BodyPrior("rod", rod, 1.0)
 
 
@@ -218,7 +218,7 @@ def test_linear_coordinates_invert_and_have_the_stated_volume(layout):
 
 
 def test_a_mixing_must_fit_the_bodies():
-    with pytest.raises(InputError, match="joint prior of 2 bodies is not a lower-triangular factor of 20 rows"):
+    with pytest.raises(InputError, match="joint prior of 2 bodies is not a lower-triangular factor with 20 rows"):
         check_mixing(((1.0,),), 2)
     with pytest.raises(InputError, match="joint prior of 1 bodies"):
         check_mixing(tuple(tuple(row) for row in np.ones((10, 10))), 1)

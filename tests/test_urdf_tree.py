@@ -69,7 +69,7 @@ BASE = '<link name="base_link">'
         (PLAIN.replace('version="1.0"', 'version="1.0" encoding="latin-1"').replace("servicer", "sévicer"), None),
         (PLAIN.replace(BASE, WORLD.format("floating"), 1), "world and its floating joint"),
         (PLAIN.replace(BASE, WORLD.format("fixed"), 1), "world and its fixed joint"),
-        (PLAIN.replace(BASE, ROS, 1), "base_link has no inertia; it takes that of bus"),
+        (PLAIN.replace(BASE, ROS, 1), "base_link has no inertia; that of bus"),
         (PLAIN.replace('axis xyz="0 0 1"', 'axis xyz="0 0 2"', 1), None),
         (PLAIN.replace('velocity="2"', 'velocity="0"', 1), "joint1: velocity 0"),
     ],
@@ -197,7 +197,7 @@ def read_or_reason(file: Path) -> tuple[Robot | None, str]:
         return None, str(error)
 
 
-REFUSED = ("mimic joints", "no inertia", "nearest physical", "it holds no link")
+REFUSED = ("mimic joints", "no inertia", "nearest physical", "it contains no link")
 
 
 @pytest.mark.slow

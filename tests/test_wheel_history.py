@@ -63,9 +63,9 @@ def test_bound_and_prior_are_those_of_a_wheel():
 
 
 def test_it_needs_an_axis_and_a_length():
-    with pytest.raises(InputError, match="no axis of the base"):
+    with pytest.raises(InputError, match="not an axis of the base"):
         create("wheel-history:link2").attach(Robot.from_urdf(SERVICER3))
-    with pytest.raises(InputError, match="does not say where"):
+    with pytest.raises(InputError, match="does not state its place"):
         create("wheel-history")
     with pytest.raises(InputError, match="last knot is at 0 s"):
         WheelHistory("x", end=0.0)

@@ -154,7 +154,7 @@ def test_a_filter_does_not_reach_across_a_gap():
 
 def test_a_filter_longer_than_the_record_is_refused():
     noise = noise_model([NoiseChannel(1e-5, EVERY[:20], Filter(0.05))])
-    with pytest.raises(InputError, match=r"the low-pass filter needs 133 evenly spaced samples and none fit"):
+    with pytest.raises(InputError, match=r"the low-pass filter needs 133 evenly spaced samples, but no section"):
         build(noise)
 
 

@@ -69,7 +69,10 @@ def test_accelerations_in_g_are_refused_whatever_the_base_weighs(study: Path, ma
 @pytest.mark.parametrize(
     ("slip", "message"),
     [
-        ("time in milliseconds", r"column 'time': the rows are 500 s apart .* in milliseconds they would be 0\.5 s"),
+        (
+            "time in milliseconds",
+            r"column 'time': the median interval between rows is 500 s.* in milliseconds it would be 0\.5 s",
+        ),
         ("time in minutes", r"column time: .* only if times are minutes\. Give times in seconds"),
     ],
 )

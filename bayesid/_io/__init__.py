@@ -1,1 +1,1 @@
-"""Errors for the user, files that are complete or absent, results kept under a key, and progress."""
+"""Errors for the user, files that are complete or absent, results stored under a key, and progress."""

@@ -7,10 +7,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Floats", "Integers", "Traceable", "log_sum", "log_sums", "namespace"]
+__all__ = ["Bools", "Floats", "Integers", "Traceable", "log_sum", "log_sums", "namespace"]
 
 Floats: TypeAlias = NDArray[np.floating[Any]]
 """NumPy array of floating-point numbers."""
+
+Bools: TypeAlias = NDArray[np.bool_]
+"""NumPy array of truth values."""
 
 Integers: TypeAlias = NDArray[np.integer[Any]]
 """NumPy array of integers."""

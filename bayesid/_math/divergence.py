@@ -26,9 +26,9 @@ class DivergenceError(InputError):
 
     def __init__(self, detail: str) -> None:
         super().__init__(
-            f"the recordings contradict the simulation so far that no fit of it is finite ({detail})",
-            remedy="See what `bayesid check` says of units, axes and joints, and whether the robot's file is that of "
-            "the robot that was recorded",
+            f"the recordings contradict the simulation so strongly that no fit is finite ({detail})",
+            remedy="Run `bayesid check` to examine units, axes and joints, and verify that the robot's file describes "
+            "the recorded robot",
         )
 
 

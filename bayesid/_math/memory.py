@@ -69,7 +69,7 @@ def refuse_beyond_memory(needed: float, what: str, remedy: str) -> None:
     """
     free = free_memory()
     if needed > free:
-        problem = f"{what} would need {needed / GIGABYTE:.1f} GB of memory, and {free / GIGABYTE:.1f} GB are free"
+        problem = f"{what} requires {needed / GIGABYTE:.1f} GB of memory, but {free / GIGABYTE:.1f} GB are free"
         raise InputError(problem, remedy=remedy)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-__all__ = ["in_threads", "several_threads"]
+__all__ = ["each_in_threads", "in_threads", "several_threads"]
 
 MOST = 4
 """Most threads."""
@@ -39,12 +39,18 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> lis
     items : iterable
         Arguments.
     """
+    return list(each_in_threads(function, items))
+
+
+def each_in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+    """Yield the results of `in_threads` one after another, each once it and those before it are there."""
     items = list(items)
     count = min(len(items), _cores())
     if count < 2:
-        return [function(one) for one in items]
+        yield from map(function, items)
+        return
     with ThreadPoolExecutor(count) as pool:
-        return list(pool.map(function, items))
+        yield from pool.map(function, items)
 
 
 def _cores() -> int:

@@ -12,13 +12,13 @@ __all__ = ["run"]
 
 
 def run(
-    name: Annotated[str | None, typer.Argument(help="Effect, by default all of them.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Name of an effect; by default all effects.")] = None,
     study: Annotated[
         Path | None,
-        typer.Option(metavar="STUDY.toml", help="Study whose robot, orbit and plugins apply, by default ETS-VII."),
+        typer.Option(metavar="STUDY.toml", help="Study whose robot, orbit and plugins are used; by default ETS-VII."),
     ] = None,
 ) -> Iterator[str]:
-    """Print every effect with its parameters, units and priors, the reason of its size, and what it needs."""
+    """Print every effect with its parameters, units, priors, the reason for its largest size, and its requirements."""
     from bayesid.app.schema import Study
 
     loaded = None if study is None else Study.load(study)

@@ -39,14 +39,17 @@ __all__ = ["app", "main"]
 
 SUFFIX = "_command"  # ending of the names of those modules of this folder that are commands
 
-FULL, CLOSED = "Free space there, and call the command again", "Choose another output folder, or allow writing there"
+FULL, CLOSED = (
+    "Free disk space there and run the command again",
+    "Choose another output folder, or grant write permission",
+)
 
 # objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles
 SELDOM = 100_000
 EXHAUSTED = "RESOURCE_EXHAUSTED"  # said by errors of JAX where memory is lacking
 LACKS_MEMORY = (
-    "there is not enough memory for this study. Give fewer or shorter recordings, or fewer blocks per second, or run "
-    "it where more memory is free"
+    "there is not enough memory for this study. Use fewer or shorter recordings, reduce blocks_per_second, or use a "
+    "machine with more free memory"
 )
 # remedies by the number of an error of the system
 REMEDIES = {
@@ -67,7 +70,7 @@ def _show_version(requested: bool) -> None:
 @app.callback()
 def _common(
     version: Annotated[
-        bool, typer.Option("--version", help="Show the version and exit.", callback=_show_version, is_eager=True)
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_show_version, is_eager=True)
     ] = False,
 ) -> None:
     """Identify the inertial parameters of free-flying space robots from recordings."""
@@ -121,7 +124,10 @@ def _reported() -> Iterator[None]:
         typer.secho(f"Error: {LACKS_MEMORY}", fg="red", err=True)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        typer.echo("Interrupted; called again, the command goes on from what it has kept, or starts anew.", err=True)
+        typer.echo(
+            "Interrupted. Run the command again to resume from the stored results, or to restart if there are none.",
+            err=True,
+        )
         raise typer.Exit(130) from None
 
 

@@ -63,10 +63,10 @@ def fixed_study(file: Path, agrees: Callable[[str], bool]) -> Iterator[str]:
         offered = [convention for convention in conventions if convention.probability > LIKELY]
         yield from convention_lines(conventions)
         if conventions and not offered:
-            yield "These cannot be told apart: choose one, and write it into the study."
+            yield "The data cannot distinguish these conventions: choose one and write it into the study."
         accepted = [offer for offer in offered if agrees(f"Write into {file.name}: {in_one_line(offer.remedy)}?")]
         if not accepted:
-            yield f"{file}: {'nothing was written' if conventions else 'no convention is wrong'}."
+            yield f"{file}: {'nothing was written' if conventions else 'no wrong convention was detected'}."
             return
         text = with_remedies(file.read_text(encoding="utf-8-sig"), [convention.remedy for convention in accepted])
         Study.from_mapping(tomllib.loads(text), file)
@@ -98,7 +98,7 @@ def with_remedies(text: str, remedies: Sequence[str]) -> str:
 def _write(lines: list[str], headers: Sequence[str], line: str) -> None:
     """Write a line with a key into the section of the last of the headers."""
     if not headers:
-        raise InputError(f"the remedy {line} is in no section", remedy="Write the section's header before it")
+        raise InputError(f"the remedy {line} belongs to no section", remedy="Write the section's header before it")
     header, key = headers[-1], line.partition("=")[0].strip()
     number = headers.count(header) - 1 if header.startswith("[[") else 0
     if _place(lines, header, number) is None:

@@ -34,7 +34,7 @@ def run(
     effective_samples: Samples = 4000.0,
     example: Annotated[str, typer.Option(metavar="NAME", help=f"Study: {', '.join(EXAMPLES)}.")] = "arm",
 ) -> Iterator[str]:
-    """Diagnose shipped recordings with a hidden cause, show that cause and write the report, without any input file."""
+    """Diagnose example recordings with a hidden cause, reveal the cause and write the report, without input files."""
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
 
@@ -42,14 +42,14 @@ def run(
         yield from _other_axes(output, seed, progress)
         return
     answer = _copy_demonstration(example, output / "study")
-    yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
+    yield f"Recordings from an independent simulator, with a hidden cause: {output / 'study'}."
     result: list[Diagnosis] = []
     study = Study.load(output / "study" / "study.toml")
     yield from diagnose_study(study, output, seed, effective_samples, progress, result.append)
     named = result[0].verdict.causes
     for cause, values in answer.items():
         parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
-        yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
+        yield f"The hidden cause was {cause}: {parts}. It was {'identified' if cause in named else 'not identified'}."
 
 
 def _other_axes(output: Path, seed: int, progress: Progress) -> Iterator[str]:
@@ -65,7 +65,7 @@ def _other_axes(output: Path, seed: int, progress: Progress) -> Iterator[str]:
         recording = Recording.read(file)
         turned = {f"{family}.{axis}": -recording.channels[f"{family}.{axis}"] for family in TURNED for axis in "yz"}
         Recording(recording.name, file, recording.time, {**recording.channels, **turned}).write(file)
-    yield f"Recordings of an independent simulator, whose sensors are in north-east-down axes: {folder}."
+    yield f"Recordings from an independent simulator whose sensors use north-east-down axes: {folder}."
     yield from diagnose_study(Study.load(folder / "study.toml"), output, seed, None, progress)
     yield from fixed_study(folder / "study.toml", lambda question: True)
 

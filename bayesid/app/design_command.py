@@ -21,18 +21,18 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 12,
-    iterations: Annotated[int, typer.Option(min=1, help="Most iterations of the optimiser from each.")] = 400,
+    starts: Annotated[int, typer.Option(min=1, help="Number of random starts per criterion.")] = 12,
+    iterations: Annotated[int, typer.Option(min=1, help="Maximum number of optimiser iterations per start.")] = 400,
     thorough: Annotated[
-        bool, typer.Option(help="Search on between the best motions, which takes about five times as long.")
+        bool, typer.Option(help="Continue the search between the best motions; this takes about five times as long.")
     ] = False,
     separate: Annotated[
         tuple[str, str] | None,
-        typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
+        typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre must distinguish."),
     ] = None,
     scheduler: Scheduler = None,
 ) -> Iterator[str]:
-    """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
+    """Design manoeuvres by several criteria within limits: design.json, a CSV file per manoeuvre, and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)
@@ -58,7 +58,7 @@ def run(
         f"{problem.plan.family.name}, {problem.plan.family.duration:g} s."
     )
     if assumed:
-        yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
+        yield f"The study gives no sensors.encoder.sigma for {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
     effort = effort_of(starts, iterations, thorough)
     key = content_key(bayesid.__version__, *study.defining_files, seed, effort, *(separate or ()))

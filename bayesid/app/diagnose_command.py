@@ -24,10 +24,10 @@ def run(
     progress: Progress,
     seed: Seed = 0,
     effective_samples: Samples = 4000.0,
-    sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee at the end.")] = True,
+    sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee after the verdict.")] = True,
     fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre where the verdict is undecided.")] = True,
 ) -> Iterator[str]:
-    """Show how the simulation deviates, name the cause, extend the model by it and measure the gain."""
+    """Compare simulation and recordings, identify the cause of deviations, extend the model and measure the gain."""
     from bayesid.app.schema import Study
 
     study, sampled = Study.load(file), effective_samples if sample else None
@@ -62,12 +62,12 @@ def diagnose_study(
     keep : callable
         Function that receives the diagnosis.
     plan : bool
-        Whether to design the manoeuvre that would decide an undecided verdict.
+        Whether to design the manoeuvre that would resolve an undecided verdict.
 
     Yields
     ------
     str
-        Sentences to show.
+        Sentences to print.
     """
     import numpy as np
 

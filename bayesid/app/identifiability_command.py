@@ -19,11 +19,11 @@ def run(
     progress: Progress,
     seed: Seed = 0,
     effective_samples: Annotated[
-        float, typer.Option("--samples", min=1.0, help="Number of effective samples where emcee is needed.")
+        float, typer.Option("--samples", min=1.0, help="Number of effective samples if emcee is required.")
     ] = 500.0,
-    profiles: Annotated[int, typer.Option(min=0, help="Largest number of parameters to profile.")] = 6,
+    profiles: Annotated[int, typer.Option(min=0, help="Maximum number of parameters to profile.")] = 6,
 ) -> Iterator[str]:
-    """Determine what manoeuvres and sensors tell of the bodies, and what would tell more: identifiability.json."""
+    """Determine which body parameters the recordings resolve, and which additions would help: identifiability.json."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -17,7 +17,7 @@ __all__ = ["run"]
 def run(
     file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0
 ) -> Iterator[str]:
-    """Identify the unknown bodies, by the posterior of their inertial parameters."""
+    """Identify the inertial parameters of the unknown bodies as a posterior distribution."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -28,8 +28,8 @@ def run(
         list[str] | None,
         typer.Option(
             metavar="[NAMES=]TOPIC",
-            help="Wheels: the velocities of a sensor_msgs/JointState, or std_msgs/Float64 or Float64MultiArray, whose "
-            "elements get names with commas; repeatable.",
+            help="Wheels: the velocities of a sensor_msgs/JointState, or a std_msgs/Float64 or Float64MultiArray, "
+            "whose elements are named in a comma-separated list; repeatable.",
         ),
     ] = None,
     imu: Annotated[str | None, typer.Option(metavar="TOPIC", help="IMU of the base, sensor_msgs/Imu.")] = None,
@@ -41,30 +41,38 @@ def run(
             "TransformStamped, nav_msgs/Odometry or sensor_msgs/Imu.",
         ),
     ] = None,
-    without: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Joint to leave out; repeatable.")] = None,
+    without: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Joint to omit; repeatable.")] = None,
     velocity: Annotated[
-        bool, typer.Option("--velocity", help="Take velocities beside positions: they are measured on their own.")
+        bool,
+        typer.Option(
+            "--velocity", help="Import velocities in addition to positions, because they are measured separately."
+        ),
     ] = False,
-    effort: Annotated[bool, typer.Option("--effort", help="Take efforts as joint torques.")] = False,
-    accel: Annotated[bool, typer.Option(help="Take the accelerations of the IMU.")] = True,
-    start: Annotated[float, typer.Option(metavar="S", help="First instant, in seconds from the first stamp.")] = 0.0,
-    end: Annotated[float | None, typer.Option(metavar="S", help="Last instant, in the same seconds.")] = None,
+    effort: Annotated[bool, typer.Option("--effort", help="Import efforts as joint torques.")] = False,
+    accel: Annotated[bool, typer.Option(help="Import the accelerations of the IMU.")] = True,
+    start: Annotated[
+        float, typer.Option(metavar="S", help="Start of the window, in seconds from the first stamp.")
+    ] = 0.0,
+    end: Annotated[
+        float | None, typer.Option(metavar="S", help="End of the window, in seconds from the first stamp.")
+    ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Length from the start, instead of --end.")
+        float | None, typer.Option(metavar="S", help="Length of the window in seconds, instead of --end.")
     ] = None,
     most_faulty: Annotated[
-        float, typer.Option(metavar="FRACTION", help="Largest share of a topic's messages to leave out as faulty.")
+        float,
+        typer.Option(metavar="FRACTION", help="Largest fraction of a topic's messages that may be omitted as faulty."),
     ] = 0.02,
     recorded: Annotated[
         list[str] | None,
         typer.Option(
             metavar="KEY=VALUE",
-            help="What was recorded otherwise than the format has it, by a key of a study, such as "
-            "joints.elbow.sign=-1 or sensors.rate.unit=deg/s; it is converted; repeatable.",
+            help="Convention of the recording that differs from the format, as a key of a study, such as "
+            "joints.elbow.sign=-1 or sensors.rate.unit=deg/s; the readings are converted; repeatable.",
         ),
     ] = None,
 ) -> Iterator[str]:
-    """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
+    """Convert a bag of ROS 1 or ROS 2 into a recording: NAME.csv, and its origin in NAME.import.json."""
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_conventions import imported_as
     from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag
@@ -107,7 +115,7 @@ def run(
     yield f"Time 0 is the stamp {format_stamp(imported.start)} s; the recording lasts {recording.time[-1]:.6g} s."
     for topic in imported.topics:
         yield (
-            f"{topic.name}: {topic.used} of {topic.messages} messages, every {topic.interval:.4g} s, "
+            f"{topic.name}: {topic.used} of {topic.messages} messages, interval {topic.interval:.4g} s, "
             f"longest gap {topic.longest_gap:.4g} s. {_faults(topic)}{_meaning(topic)}"
         )
     yield f"Wrote {file}."
@@ -116,8 +124,8 @@ def run(
 def _faults(topic: ImportedTopic) -> str:
     """Return what was left out of a topic and put in order, in one sentence, or nothing."""
     parts = [f"{count} {'message' if count == 1 else 'messages'} ({text})" for text, count in topic.left_out.items()]
-    text = f"Left out: {'; '.join(parts)}. " if parts else ""
-    return f"{text}Put in the order of their stamps: {topic.reordered}. " if topic.reordered else text
+    text = f"Omitted: {'; '.join(parts)}. " if parts else ""
+    return f"{text}Sorted by their stamps: {topic.reordered}. " if topic.reordered else text
 
 
 def _meaning(topic: ImportedTopic) -> str:
@@ -126,16 +134,16 @@ def _meaning(topic: ImportedTopic) -> str:
     frame = f"frame '{topic.frame}'" if topic.frame else "a frame without a name"
     if "attitude" in families:
         return (
-            f"Taken as the rotation from base axes to {frame}, which must be orbit axes: they do not rotate, x is the "
-            "zenith at time 0, z the orbit normal."
+            f"Interpreted as the rotation from base axes to {frame}, which must be orbit axes: non-rotating, with x "
+            "along the zenith at time 0 and z along the orbit normal."
         )
     if "rate" in families or "accel" in families:
         units = {"rate": "angular velocity in rad/s", "accel": "acceleration without gravity in m/s2"}
         quantities = " and ".join(units[family] for family in families)
-        return f"Taken as {quantities}, in the axes of {frame}; the study gives their mounting on the base."
+        return f"Interpreted as {quantities}, in the axes of {frame}; the study states their mounting."
     if families == [WHEEL_SPEED]:
-        return f"Taken as the speed in rad/s of {', '.join(column.partition('.')[2] for column in topic.columns)}."
+        return f"Interpreted as speed in rad/s of {', '.join(column.partition('.')[2] for column in topic.columns)}."
     units = {"position": "rad or m", "velocity": "rad/s or m/s", "torque": "N m or N"}
     joints = dict.fromkeys(column.partition(".")[2] for column in topic.columns)
     quantities = ", ".join(f"{family} in {units[family]}" for family in families)
-    return f"Taken as {quantities} of {', '.join(joints)}."
+    return f"Interpreted as {quantities} of {', '.join(joints)}."

@@ -23,25 +23,25 @@ def run(
         Path | None, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")
     ] = None,
     nearest_physical: Annotated[
-        bool, typer.Option("--nearest-physical", help="Give links with impossible inertias the nearest possible one.")
+        bool, typer.Option("--nearest-physical", help="Replace impossible link inertias by the nearest possible ones.")
     ] = False,
     fix: Annotated[
         Path | None,
-        typer.Option("--fix", metavar="STUDY.toml", help="Study into which remedies of wrong conventions are written."),
+        typer.Option("--fix", metavar="STUDY.toml", help="Study in which wrong conventions are corrected."),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Write them without asking.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Write the corrections without asking.")] = False,
 ) -> Iterator[str]:
-    """Draft a study file for a robot and its recordings, with marks where something could not be known."""
+    """Draft a study file for a robot and its recordings, and mark values that need to be checked."""
     if fix is not None:
         from bayesid.app.convention_remedies import fixed_study
 
         yield from fixed_study(fix, (lambda question: True) if yes else typer.confirm)
         return
     if robot is None or not recordings or output is None:
-        problem = "robot, recordings and --output are needed"
+        problem = "robot, recordings and --output are required"
         raise InputError(problem, remedy="bayesid init ROBOT.urdf RECORDING... --output STUDY.toml")
     if output.exists():
-        raise InputError("the file exists", file=output, remedy="Choose another output; init overwrites nothing")
+        raise InputError("the file exists", file=output, remedy="Choose another output; init never overwrites a file")
     if output.suffix != ".toml":
         raise InputError("a study is a TOML file", file=output, remedy=f"Name it {output.with_suffix('.toml')}")
 
@@ -59,7 +59,7 @@ def run(
     try:
         Study.from_mapping(tomllib.loads(text))
     except InputError as error:
-        problem = f"the recordings give no valid study: {error.problem}"
+        problem = f"no valid study can be drafted from the recordings: {error.problem}"
         raise InputError(problem, place=error.place, remedy=error.remedy) from None
     create_folder(output.parent)
     write_text(output, text)

@@ -28,21 +28,24 @@ def run(
     ] = None,
     precision: Annotated[
         float | None,
-        typer.Option("--wanted", help="Relative sd of mass and principal moments; 0.01 if nothing else is wanted."),
+        typer.Option(
+            "--wanted", help="Required relative sd of mass and principal moments; 0.01 if no other goal is given."
+        ),
     ] = None,
     wanted_sd: Annotated[
-        list[str] | None, typer.Option(metavar="BODY.QUANTITY=SD", help="Sd of a quantity in SI units; repeatable.")
+        list[str] | None,
+        typer.Option(metavar="BODY.QUANTITY=SD", help="Required sd of a quantity in SI units; repeatable."),
     ] = None,
     wanted_tip: Annotated[
-        float | None, typer.Option(metavar="MM", help="Semi-axis of the end-effector's 95 % region.")
+        float | None, typer.Option(metavar="MM", help="Required longest semi-axis of the end-effector's 95 % region.")
     ] = None,
     wanted_cause: Annotated[
         str | None, typer.Option(metavar="NAME[=0.95]", help="Cause whose presence is to be decided.")
     ] = None,
-    at_most: Annotated[int, typer.Option(help="Largest number of manoeuvres.")] = 5,
-    diagnose: Annotated[bool, typer.Option(help="Diagnose after every step, and stop if the model is wrong.")] = True,
+    at_most: Annotated[int, typer.Option(help="Maximum number of manoeuvres.")] = 5,
+    diagnose: Annotated[bool, typer.Option(help="Diagnose after every step and stop if the model is wrong.")] = True,
 ) -> Iterator[str]:
-    """Plan a manoeuvre, have it executed, identify, diagnose, plan again: loop.json and report.pdf."""
+    """Plan a manoeuvre, have it executed, identify, diagnose and repeat: loop.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

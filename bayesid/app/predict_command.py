@@ -21,10 +21,10 @@ def run(
     seed: Seed = 0,
     draws: Annotated[int, typer.Option(min=2, help="Number of draws of the robot's parameters.")] = 500,
     posterior: Annotated[
-        Path | None, typer.Option(help="posterior.nc of an earlier study, in place of the study's prior.")
+        Path | None, typer.Option(help="posterior.nc of an earlier study, which replaces the study's prior.")
     ] = None,
 ) -> Iterator[str]:
-    """Predict where planned joint motions take base and end-effector: prediction.json and report.pdf."""
+    """Predict the motion of base and end-effector for planned joint motions: prediction.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

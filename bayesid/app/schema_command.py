@@ -16,7 +16,7 @@ def run(
         Path | None, typer.Option("--output", "-o", help="File to write; by default the schema is printed.")
     ] = None,
 ) -> Iterator[str]:
-    """Write the JSON Schema of the study file, with which editors complete and check it."""
+    """Write the JSON Schema of study files, for completion and validation in editors."""
     import json
 
     from bayesid.app.schema.editor_schema import editor_schema
@@ -29,4 +29,4 @@ def run(
 
     create_folder(output.parent)
     write_json(output, editor_schema())
-    yield f"Wrote {output}. Name it in the first line of a study: #:schema {output.name}"
+    yield f"Wrote {output}. Reference it in the first line of a study: #:schema {output.name}"

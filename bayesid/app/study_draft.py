@@ -94,7 +94,7 @@ def open_places(study: Study) -> list[str]:
     if count == 0:
         return []
     places = "1 place is" if count == 1 else f"{count} places are"
-    return [f"{places} still marked `{CHECK}` in {study.file}: what is drafted there is a guess."]
+    return [f"{places} still marked `{CHECK}` in {study.file}: the drafted values there are guesses."]
 
 
 def _line(content: str, note: str = "") -> str:
@@ -114,7 +114,7 @@ def _section(*lines: str) -> str:
 def _head(title: str) -> str:
     return _section(
         "# Study for bayesid, drafted from its recordings. SI units, radians, quaternions x, y, z, w.",
-        "# Editors complete and check it after `bayesid schema --output study.schema.json`, with the first line",
+        "# For completion and validation in editors: bayesid schema --output study.schema.json, and the first line",
         "# #:schema study.schema.json",
         f"title = {_quoted(title)}",
     )
@@ -126,7 +126,7 @@ def _robot(robot: Robot, urdf: Path, folder: Path, nearest_physical: bool) -> st
         f"urdf = {_path(urdf, folder)}",
         *(["nearest_physical = true"] if nearest_physical else []),
         _unsure("link_spread = 0.0", "relative uncertainty of all links that are not unknown; 0 = known exactly"),
-        "# joints, all of them recorded:" if robot.joints else "# no moving joints",
+        "# joints, all recorded:" if robot.joints else "# no moving joints",
         *(f"#   {joint.name}: {joint.kind}, {_limits(joint)}" for joint in robot.joints),
     )
 
@@ -136,11 +136,11 @@ def _wheel(name: str, robot: Robot) -> str:
     size = RobotSize.of(robot)
     inertia = ROTOR * size.mass * (ROTOR_RADIUS * size.length) ** 2
     return _section(
-        _line("[[robot.wheels]]", "its recorded speed gives the base its momentum"),
+        _line("[[robot.wheels]]", "its momentum follows from its recorded speed"),
         f"name = {_quoted(name)}",
         _unsure("axis = [0.0, 0.0, 1.0]", "unit vector, base axes"),
-        _unsure(f"inertia = {inertia:.1e}", "kg m2 about the axis; at rest part of the base's"),
-        _unsure("position = [0.0, 0.0, 0.0]", "m, base frame; it matters for an imbalance alone"),
+        _unsure(f"inertia = {inertia:.1e}", "kg m2 about the axis; included in the inertia of the base"),
+        _unsure("position = [0.0, 0.0, 0.0]", "m, base frame; used only for an imbalance"),
     )
 
 
@@ -151,14 +151,14 @@ def _limits(joint: Joint) -> str:
 
 
 ORBIT = _section(
-    _unsure("# [orbit]", "where the robot is in orbit, remove the marks of these two lines"),
+    _unsure("# [orbit]", "for a robot in orbit, uncomment these two lines"),
     _line("# radius = 6.916e6", "m, from the Earth's centre"),
 )
 
 MODEL = _section(
     "[model]",
-    _unsure("effects = []", 'in orbit ["gravity-gradient"]; `bayesid catalogue` prints all'),
-    _unsure('initial_rate = "unknown"', '"zero" where the base rests at time 0'),
+    _unsure("effects = []", 'in orbit ["gravity-gradient"]; `bayesid catalogue` lists all effects'),
+    _unsure('initial_rate = "unknown"', '"zero" if the base is at rest at time 0'),
 )
 
 
@@ -170,7 +170,7 @@ def _require_base_sensor(recordings: Sequence[Recording]) -> None:
     if not any(len(_holding(recordings, family)) == len(recordings) for family in UNITS):
         raise InputError(
             f"no sensor of the base is in all recordings ({', '.join(recording.name for recording in recordings)})",
-            remedy="Give recordings that all have rate.x|y|z, accel.x|y|z or attitude.x|y|z|w",
+            remedy="Give recordings that all contain rate.x|y|z, accel.x|y|z or attitude.x|y|z|w",
         )
 
 
@@ -180,7 +180,7 @@ def _vector_sensor(recordings: Sequence[Recording], family: str) -> str:
     if not holding:
         return ""
     sigma = _vector_noise(holding, family)
-    source = "estimated from the recordings" if sigma else "a guess, as the readings show no noise"
+    source = "estimated from the recordings" if sigma else "a guess, because the readings contain no noise"
     shown = _one_or_each(sigma or (UNSEEN[family],) * 3)
     lines = [f"[sensors.{family}]", _unsure(f"sigma = {shown}", f"{UNITS[family]}, per sample, {source}")]
     if family == "accel":
@@ -190,12 +190,12 @@ def _vector_sensor(recordings: Sequence[Recording], family: str) -> str:
         lines.append(_unsure("mounting = [0.0, 0.0, 0.0, 1.0]", "quaternion from sensor to base axes"))
     if len(holding) < len(recordings):
         missing = ", ".join(recording.name for recording in recordings if recording not in holding)
-        lines = [f"{CHECK}: the sensor is left out, since {missing} lacks it", *(f"# {line}" for line in lines)]
+        lines = [f"{CHECK}: the sensor is omitted because {missing} lacks it", *(f"# {line}" for line in lines)]
     return _section(*lines)
 
 
 def _encoder(robot: Robot, recordings: Sequence[Recording]) -> str:
-    lines = [_line("[sensors.encoder]", "what is left out is estimated whenever the recordings are read")]
+    lines = [_line("[sensors.encoder]", "omitted values are estimated when the recordings are read")]
     for key, family, unit in (("sigma", "position", "rad or m"), ("velocity_sigma", "velocity", "rad/s or m/s")):
         seen = {joint.name: channel_noise(recordings, f"{family}.{joint.name}") for joint in robot.joints}
         estimated = {name: sigma for name, sigma in seen.items() if sigma is not None}
@@ -212,7 +212,7 @@ def _torque(recordings: Sequence[Recording]) -> str:
     if not any(column.startswith("torque.") for recording in recordings for column in recording.channels):
         return ""
     return _section(
-        _unsure("# [sensors.torque]", "joint torques are recorded, and used only where this section stands"),
+        _unsure("# [sensors.torque]", "joint torques are recorded, but used only with this section"),
         _line("# sigma = 0.1", "N m or N"),
     )
 
@@ -228,19 +228,21 @@ def _recording(recording: Recording, folder: Path) -> str:
     else:
         lines.append(_unsure("attitude = [0.0, 0.0, 0.0, 1.0]", "base to orbit axes at time 0"))
         lines.append(_unsure("attitude_sigma = 0.0", "rad; 0 = exact"))
-    lines.append(_line("# argument_of_latitude = 0.0", "rad at time 0, for effects that need the place on the orbit"))
+    lines.append(
+        _line("# argument_of_latitude = 0.0", "rad at time 0, for effects that depend on the orbital position")
+    )
     driven = [name for name in recording.joints if f"position.{name}" not in recording.channels]
     if driven:
         start = ", ".join(f"{_quoted(name)} = 0.0" for name in driven)
-        lines.append(_unsure(f"start = {{ {start} }}", "positions at time 0 of joints recorded by speed alone"))
+        lines.append(_unsure(f"start = {{ {start} }}", "positions at time 0 of joints recorded by speed only"))
     return _section(*lines)
 
 
 def _unknowns(robot: Robot) -> str:
     return _section(
         "[unknowns]",
-        _unsure(f"bodies = [{_quoted(robot.base)}]", "links or loads whose ten inertial parameters are sought"),
-        _unsure("spread = 1.0", "relative width of their prior about the values of the robot's file"),
+        _unsure(f"bodies = [{_quoted(robot.base)}]", "links or loads whose ten inertial parameters are identified"),
+        _unsure("spread = 1.0", "relative width of their prior about the values in the robot's file"),
     )
 
 

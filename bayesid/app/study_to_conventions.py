@@ -87,14 +87,14 @@ def imported_as(remedies: Sequence[str], joints: Sequence[str]) -> RecordedAs:
     try:
         content = tomllib.loads("\n".join(map(_line, remedies)))
     except tomllib.TOMLDecodeError as error:
-        problem = f"{'; '.join(remedies)} is no list of keys with values: {error}"
+        problem = f"{'; '.join(remedies)} is not a list of keys with values: {error}"
         raise InputError(problem, place="--recorded", remedy='Write them like "joints.elbow.sign=-1"') from None
     for key in content.keys() - {"joints", "sensors"}:
         raise InputError(f"there is no {key}", place="--recorded", remedy="Begin with joints. or sensors.")
     sensors, moved = content.get("sensors", {}), content.get("joints", {})
     parts = [table for part in (sensors, moved) for table in (part, *(part.values() if isinstance(part, dict) else ()))]
     if not all(isinstance(part, dict) for part in parts):
-        problem = f"{'; '.join(remedies)} names no key of a sensor or joint"
+        problem = f"{'; '.join(remedies)} does not name a key of a sensor or joint"
         raise InputError(problem, place="--recorded", remedy='Write it like "joints.elbow.sign=-1"')
     later = [f"sensors.{name}.{key}" for name in sensors for key in sensors[name] if key in STUDY_KEYS]
     later += [f"sensors.encoder.{key}" for key in ("unit", "scale") if key in sensors.get("encoder", {})]
@@ -167,4 +167,4 @@ def convention_lines(conventions: Sequence[Convention]) -> list[str]:
 
 def remedy_sentence(file: Path | None) -> str:
     """Return how to write remedies into a study."""
-    return f"Write that into the study, or let it be written: bayesid init --fix {file or 'STUDY.toml'}"
+    return f"Write this into the study, or run: bayesid init --fix {file or 'STUDY.toml'}"

@@ -111,7 +111,9 @@ def separating(study: Study, rivals: tuple[str, str]) -> Study:
     """
     if rivals[0] == rivals[1]:
         raise InputError(
-            f"{rivals[0]!r} cannot be told from itself", place="--separate", remedy="Name two different effects"
+            f"{rivals[0]!r} cannot be distinguished from itself",
+            place="--separate",
+            remedy="Name two different effects",
         )
     section = study.design or DesignSection()
     chosen = section.model_copy(update={"criteria": (Separation.name,), "rivals": rivals})
@@ -130,7 +132,7 @@ def _with_rivals(model: Model, section: DesignSection) -> Model:
         raise error.within(place="design.rivals") from None
     for effect in model.effects:
         if effect.label in section.rivals and not effect.parameters:
-            problem = f"effect {effect.label!r} has no unknown size by which it could be told from others"
+            problem = f"effect {effect.label!r} has no unknown size by which it could be distinguished from others"
             raise InputError(problem, place="design.rivals", remedy="Name effects with parameters")
     return model
 
@@ -158,10 +160,10 @@ def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
         remedy = "Name at least one joint of the URDF"
         if not names:
             remedy = (
-                "The robot has none, and only joints are designed for: list planned speeds of its wheels as recordings "
-                "without readings; `bayesid identifiability` says what they would show"
+                "The robot has no joints, and only joint motion can be designed: list planned wheel speeds as "
+                "recordings without readings, and evaluate them with `bayesid identifiability`"
             )
-        raise InputError("no joint is to move", place="design.joints", remedy=remedy)
+        raise InputError("no joint is selected to move", place="design.joints", remedy=remedy)
     start, functions = _start(robot, section), section.functions or FUNCTIONS
     if section.parameterisation == "fourier":
         return Fourier(start, moving, section.duration, functions // 2 + 1)
@@ -208,9 +210,9 @@ def _check_traceable(plan: Plan) -> None:
             raise
         except (TypeError, ValueError) as error:  # from JAX, or from NumPy for a traced array
             raise InputError(
-                f"effect {effect.label!r} computes the joints' motion outside JAX, so that a design has no gradient",
+                f"effect {effect.label!r} computes the joints' motion outside JAX, so the design has no gradient",
                 place="model.effects",
-                remedy="Leave it out of the model for the design",
+                remedy="Omit it from the model for the design",
             ) from error
 
 

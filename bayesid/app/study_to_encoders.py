@@ -74,6 +74,6 @@ def named_joint(name: str, robot: Robot, place: str, file: Path | None = None) -
     names = [joint.name for joint in robot.joints]
     if name not in names:
         hint = suggest(name, names)
-        remedy = hint or (f"Choose one of {', '.join(names)}" if names else "Take it out")
+        remedy = hint or (f"Choose one of {', '.join(names)}" if names else "Remove it")
         raise InputError(f"the robot has no moving joint '{name}'", file=file, place=place, remedy=remedy)
     return names.index(name)

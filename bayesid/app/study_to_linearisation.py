@@ -92,7 +92,7 @@ def fitted_point(posterior: Posterior, rng: np.random.Generator) -> Linearisatio
         f"chi-square is {optimum.chi2 / refined.samples:.3f} per sample."
     )
     if optimum.chi2 - refined.samples > MISFIT * np.sqrt(2.0 * refined.samples):
-        statement += " The model does not explain the data: what follows supposes that it does, so diagnose them first."
+        statement += " The model does not explain the data, but the results below assume it: run a diagnosis first."
     return LinearisationPoint(Basis.FIT, statement, refined, optimum)
 
 
@@ -104,12 +104,12 @@ def _predicted(
     centre = np.zeros(posterior.size)
     posterior = relinearised(posterior, centre)
     statement = (
-        f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted; its motion "
-        "is taken as planned. The sensors are supposed to read what the prior's centre predicts, with the declared "
-        "noise."
+        f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted. "
+        "The motion is assumed to be as planned, and the sensors to read the prediction of the prior's centre with the "
+        "declared noise."
     )
     if assumed:
-        statement += f" The study gives no encoder noise of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
+        statement += f" The study gives no encoder noise for {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     return LinearisationPoint(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import file_key
+from bayesid._math.threads import each_in_threads
 from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
 from bayesid.app.schema.sensor_sections import FilteredSensor
 from bayesid.app.study_to_conventions import recorded_as
@@ -173,7 +174,7 @@ def _check_levers(model: Model) -> None:
         distance = float(np.linalg.norm(sensor.position))
         if distance > FARTHEST * max(radius, 1.0):
             raise InputError(
-                f"the sensor lies {distance:.4g} m from the base's origin, whose radius is {radius:.3g} m",
+                f"the sensor is {distance:.4g} m from the origin of the base, whose radius is {radius:.3g} m",
                 place=f"sensors.{sensor.kind.value}.position",
                 remedy="Give it in metres, in base axes",
             )
@@ -204,10 +205,12 @@ def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress 
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     _check_latitudes(study)
-    manoeuvres = []
-    for number, section in enumerate(study.recordings):
-        progress(number / len(study.recordings), f"reading {section.file.name} and smoothing the joints' motion")
-        manoeuvres.append(_load_manoeuvre(study, section, robot))
+    manoeuvres: list[Manoeuvre] = []
+    count = len(study.recordings)
+    progress(0.0, "reading the recordings and smoothing the joints' motion")
+    for manoeuvre in each_in_threads(lambda section: _load_manoeuvre(study, section, robot), study.recordings):
+        manoeuvres.append(manoeuvre)
+        progress(len(manoeuvres) / count, f"recording {len(manoeuvres)} of {count} read, joint motion smoothed")
     _refuse_copies(study, manoeuvres)
     if not study.model.noise:
         return manoeuvres
@@ -223,8 +226,8 @@ def _refuse_copies(study: Study, manoeuvres: Sequence[Manoeuvre]) -> None:
         if {name.partition(".")[0] for name in manoeuvre.recording.channels} <= {"time", *JOINT_FAMILIES, WHEEL_SPEED}:
             continue
         if (same := seen.setdefault(file_key(section.file), section.file)) != section.file:
-            problem = f"'{section.file.name}' holds the same as '{same.name}'"
-            remedy = "Remove one: the same data would count twice"
+            problem = f"'{section.file.name}' has the same content as '{same.name}'"
+            remedy = "Remove one: the same data would be counted twice"
             raise InputError(problem, file=study.file, place=f"recordings #{number}.file", remedy=remedy)
 
 
@@ -236,10 +239,10 @@ def _check_latitudes(study: Study) -> None:
     for number, section in enumerate(study.recordings, start=1):
         if placed and section.argument_of_latitude is None:
             raise InputError(
-                f"the key is missing, and {placed[0]!r} depends on where on the orbit the recording was made",
+                f"the key is missing, and {placed[0]!r} depends on the orbital position of the recording",
                 file=study.file,
                 place=f"recordings #{number}.argument_of_latitude",
-                remedy="Give the argument of latitude at time 0 [rad], or leave the effect out",
+                remedy="Give the argument of latitude at time 0 [rad], or omit the effect",
             )
 
 
@@ -314,7 +317,7 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
 def _effect(label: str, place: str) -> Effect:
     """Return the effect of a label; a verdict may also name what a study states elsewhere."""
     if label == "initial-rate":
-        raise InputError(f"{label!r} is no effect", place=place, remedy='Set initial_rate = "unknown" in its place')
+        raise InputError(f"{label!r} is not an effect", place=place, remedy='Set initial_rate = "unknown" instead')
     try:
         return create(label)
     except InputError as error:
@@ -323,7 +326,7 @@ def _effect(label: str, place: str) -> Effect:
         if fault := noise_faults().get(label):
             keys = ", ".join(f"{quantity.name} = ..." for quantity in fault.quantities)
             remedy = f'State it under [model.noise] as "{label}" = {{ {keys} }}'
-            raise InputError(f"{label!r} is a fault of the noise", place=place, remedy=remedy) from None
+            raise InputError(f"{label!r} is a noise fault", place=place, remedy=remedy) from None
         raise error.within(place=place) from None
 
 

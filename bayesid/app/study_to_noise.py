@@ -32,13 +32,13 @@ def with_stated_noise(study: Study, model: Model) -> Model:
         place = f"model.noise.{label}"
         if label not in known:
             remedy = f"Choose from {', '.join(known)}"
-            raise InputError(f"unknown fault of the noise {label!r}", place=place, remedy=remedy)
+            raise InputError(f"unknown noise fault {label!r}", place=place, remedy=remedy)
         try:
             model = known[label].in_model(model, _sizes(known[label], given))
         except InputError as error:
             raise error.within(place=place) from None
         except ValueError:
-            remedy = "Give a number, or one for each axis where the quantity is that of a sensor's axes"
+            remedy = "Give a number, or one for each axis if the quantity applies to the axes of a sensor"
             raise InputError(f"got {dict(given)}", place=place, remedy=remedy) from None
     return model
 

@@ -127,7 +127,9 @@ class BasePredictor:
             Source of the draws.
         """
         if draws < FEWEST:
-            raise InputError(f"{draws} draws give no region", remedy=f"Ask for {FEWEST} or more; hundreds are usual")
+            raise InputError(
+                f"{draws} draws are too few for a region", remedy=f"Use {FEWEST} or more; several hundred are typical"
+            )
         return Prediction(self.name, self.tip_frame, self.rate, *self.courses(self.draw(draws, rng)))
 
     @property
@@ -198,7 +200,7 @@ def _planned(recording: Recording) -> Recording:
     It has the times of the given recording, or `INSTANTS` even ones where there are no actions.
     """
     if any(np.nan_to_num(recording.channels.get(f"base_force.{axis}", np.zeros(1))).any() for axis in "xyz"):
-        problem = "a known force acts on the base, and moves the centre of mass"
+        problem = "a known force acts on the base and moves the centre of mass"
         remedy = "Predict manoeuvres without thrust"
         raise InputError(problem, file=recording.file or recording.name, place="column base_force.x|y|z", remedy=remedy)
     known = {key: recording.channels[key] for key in recording.channels if key.startswith(("base_t", "wheel_"))}
@@ -218,7 +220,7 @@ def _first_rate(model: Model, recording: Recording) -> Floats:
 
 def _quaternions(turn: Floats) -> Floats:
     if not np.isfinite(turn).all():
-        problem = "some draws of the prior give no finite motion: it holds bodies that would whirl"
+        problem = "some draws of the prior give no finite motion: it contains bodies that would spin extremely fast"
         remedy = "Take the posterior of an identification as prior (unknowns.posterior), or a narrower spread"
         raise InputError(problem, place="unknowns.spread", remedy=remedy)
     return Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_quat().reshape(*turn.shape[:2], 4)

@@ -61,7 +61,7 @@ class Criterion:
     name : str
         Name of the criterion in study files, reports and design.json.
     meaning : str
-        What the criterion rewards, as reports print it.
+        Description of the criterion, as printed in reports.
     informed : bool
         Whether the cost depends on the information of the sensors, which takes longest to compute.
     usual : bool
@@ -73,7 +73,7 @@ class Criterion:
     """
 
     name: ClassVar[str] = ""
-    meaning: ClassVar[str] = "A criterion that the user defined."
+    meaning: ClassVar[str] = "A user-defined criterion."
     informed: ClassVar[bool] = True
     usual: ClassVar[bool] = False
     compares_rivals: ClassVar[bool] = False
@@ -98,7 +98,7 @@ class Criterion:
 
     @property
     def unseen(self) -> Mapping[str, int]:
-        """Number of directions of a rival's amplitudes that are left out since no manoeuvre shows them, by label."""
+        """Number of directions of a rival's amplitudes that are omitted since no manoeuvre excites them, by label."""
         return {}
 
     @property
@@ -216,10 +216,9 @@ class Paper26(Criterion):
 
     name = "paper-26"
     meaning = (
-        "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
-        "attitude. The signed differences cancel most of it: of each triple −y1² + y2² + 3 y3² remains to be "
-        "maximised, which rewards the third state, penalises the first and says nothing of balance. Metres are added "
-        "to radians."
+        "The paper's (26) as printed, for the largest excursions y1, y2, y3 of the base's position and of its "
+        "attitude. The signed differences cancel most terms: for each triple, −y1² + y2² + 3 y3² is maximised, which "
+        "rewards the third state, penalises the first and does not measure balance. Metres are added to radians."
     )
     informed = False
     usual = True
@@ -247,8 +246,8 @@ class Paper26Intended(Paper26):
 
     name = "paper-26-intended"
     meaning = (
-        "What (26) appears to intend: the squares of the excursions less the sizes of their differences, so that an "
-        "uneven motion counts against itself whatever the sign."
+        "The apparent intention of (26): the squares of the excursions minus the magnitudes of their differences, so "
+        "that uneven motion is penalised for either sign."
     )
     usual = False
 
@@ -314,7 +313,7 @@ class EOptimal(Criterion):
     """Logarithm of the standard deviation of the log-Cholesky coordinates along the worst direction."""
 
     name = "e-optimal"
-    meaning = "The smallest standard deviation along the direction that is known worst."
+    meaning = "The smallest standard deviation along the least-known direction."
     usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
@@ -332,7 +331,7 @@ class InformationGain(Criterion):
 
     name = "information-gain"
     meaning = (
-        "The largest expected gain of information on the bodies, averaged over draws of their prior instead of taken "
+        "The largest expected information gain on the bodies, averaged over draws of their prior instead of evaluated "
         "at its centre."
     )
     usual = True
@@ -350,13 +349,13 @@ class Separation(Criterion):
     """Smallest signal-to-noise ratio of any of several rival effects, with all other unknowns marginalised.
 
     The other unknowns include the remaining rivals. Half the squared ratio is the expected log Bayes factor of the
-    rival against all others if it acts in the direction of its amplitudes that shows least, with the size of its prior.
+    rival against all others if it acts in the least visible direction of its amplitudes, with the size of its prior.
     For two effects of one parameter the squared ratio is lambda (1 - rho^2) of the weaker one. The model of the plan
     must contain the rivals.
 
-    A direction that all other unknowns imitate in every manoeuvre, such as a constant force beside the bias of an
-    accelerometer, would be the worst of each manoeuvre, whatever the manoeuvre does for the others. `adapted` leaves
-    such directions out.
+    A direction that all other unknowns imitate in every manoeuvre, such as a constant force together with the bias of
+    an accelerometer, would be the worst of each manoeuvre, whatever the manoeuvre does for the others. `adapted` omits
+    such directions.
 
     Parameters
     ----------
@@ -368,8 +367,8 @@ class Separation(Criterion):
 
     name = "separation"
     meaning = (
-        "The largest expected log Bayes factor between the rival effects, each in the direction of its amplitudes that "
-        "shows least, with everything else unknown. Directions that no manoeuvre shows are left out."
+        "The largest expected log Bayes factor between the rival effects, each in the least visible direction of its "
+        "amplitudes, with all other quantities unknown. Directions that no manoeuvre can excite are omitted."
     )
     compares_rivals = True
     LEAST: ClassVar[float] = 1.0
@@ -381,7 +380,7 @@ class Separation(Criterion):
     def __post_init__(self) -> None:
         if len(self.rivals) < 2:
             raise InputError(
-                f"{len(self.rivals)} effects to tell apart", place="design.rivals", remedy="Name at least two"
+                f"{len(self.rivals)} effects to distinguish", place="design.rivals", remedy="Name at least two"
             )
 
     @property
@@ -458,7 +457,7 @@ def expected_probability(noncentrality: float) -> float:
     """Return the mean posterior probability of the true one of two rivals that were equally probable before.
 
     The log Bayes factor of two rivals of known size is normal with mean ``lambda / 2`` and variance ``lambda``, where
-    ``lambda`` is the noncentrality that the true one keeps after the other has taken its share.
+    ``lambda`` is the noncentrality that remains for the true one after the other has absorbed its share.
     """
     points, weights = np.polynomial.hermite_e.hermegauss(61)  # so many nodes are good to 1e-6
     factors = 0.5 * noncentrality + np.sqrt(noncentrality) * points

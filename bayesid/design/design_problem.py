@@ -93,7 +93,7 @@ class Problem:
     plan : Plan
         Family of manoeuvres.
     limits : Limits
-        Limits that a manoeuvre must keep.
+        Limits that a manoeuvre must satisfy.
     criteria : sequence of Criterion
         Criteria that may be evaluated; they share one compiled simulation.
     known : Known, optional
@@ -153,7 +153,9 @@ class Problem:
         """Return the problem with other bounds of the same limits, without a new compilation."""
         new = replace(self, limits=limits)
         if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
-            raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
+            raise InputError(
+                "the set of applicable limits differs from before", place="limits", remedy="Change bounds only"
+            )
         return self._sharing(new)
 
     def using(self, shares: Floats) -> Problem:

@@ -87,7 +87,7 @@ class Design:
 
     @property
     def go(self) -> bool:
-        """True if every limit holds with 99 % probability under the present uncertainty."""
+        """True if every limit is satisfied with 99 % probability under the present uncertainty."""
         return all(risk.go for risk in self.risks) and all(reached.kept for reached in self.reached)
 
     def to_dict(self) -> dict[str, Any]:
@@ -123,18 +123,18 @@ class Design:
 
 
 def best_design(designs: Sequence[Design]) -> Design:
-    """Return the design with the smallest posterior covariance among those that keep their limits.
+    """Return the design with the smallest posterior covariance among those that satisfy their limits.
 
     Raises
     ------
     InputError
-        If no design keeps its limits.
+        If no design satisfies its limits.
     """
     kept = [design for design in designs if all(reached.kept for reached in design.reached)]
     if not kept:
         broken = {reached.name for design in designs for reached in design.reached if not reached.kept}
-        problem = f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}"
-        raise InputError(problem, place="design.limits", remedy="Loosen these limits, or allow more time")
+        problem = f"no design satisfies its limits throughout the manoeuvre: {', '.join(sorted(broken))}"
+        raise InputError(problem, place="design.limits", remedy="Relax these limits, or allow more time")
     return min(kept, key=lambda design: design.predicted.log_det)
 
 
@@ -179,7 +179,7 @@ def design(
     search : Search
         Effort of the search by each criterion.
     first : sequence of (n,) arrays
-        Parameters to start from besides the random starts, such as the best of a family that this one contains.
+        Parameters to start from in addition to the random starts, such as the best of a family that this one contains.
     store : Store, optional
         Store of the results, for a run that may be interrupted.
     progress : Progress
@@ -188,7 +188,7 @@ def design(
     Raises
     ------
     InputError
-        If no manoeuvre keeps the limits.
+        If no manoeuvre satisfies the limits.
     """
     store = Store.forgetful() if store is None else store
     count = len(problem.criteria)
@@ -224,7 +224,7 @@ def design(
         name, rng = problem.criteria[index].name, np.random.default_rng(streams[index])
         return evaluate(problem, name, optima[index], encoder, rng, points=points)
 
-    progress(EVALUATING, "predicting what each manoeuvre leads to")
+    progress(EVALUATING, "predicting the result of each manoeuvre")
     return _each(evaluate_by, count, search.executor)
 
 

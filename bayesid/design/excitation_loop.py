@@ -73,7 +73,7 @@ class Loop:
     seed : int
         Seed of all random numbers.
     goals : sequence of Goal
-        What must be reached for the loop to stop, all of them; by default a relative precision of 1 %.
+        Goals, all of which must be reached for the loop to stop; by default a relative precision of 1 %.
     at_most : int
         Largest number of manoeuvres.
     search : Search
@@ -81,8 +81,8 @@ class Loop:
     identifier : Identifier
         Method of the identification.
     reviewer : Reviewer, optional
-        Method by which the recordings so far are reviewed after each step. If they show that the model is wrong, the
-        loop stops, unless a goal asks what it is that is wrong.
+        Method by which the recordings so far are reviewed after each step. If they indicate a wrong model, the loop
+        stops, unless a goal asks for the cause.
     """
 
     problem: Problem
@@ -96,7 +96,7 @@ class Loop:
 
     def __post_init__(self) -> None:
         if self.reviewer is None and any(goal.diagnosed for goal in self.goals):
-            problem = "a probability of a cause is wanted, but the steps are not reviewed"
+            problem = "a goal requires the probability of a cause, but the steps are not reviewed"
             raise InputError(problem, place="goals", remedy="Give a reviewer, such as DiagnosisReview")
 
     def run(self, spacecraft: Spacecraft | None, folder: Path, progress: Progress = silent) -> History:

@@ -44,7 +44,7 @@ class StepKnowledge:
 
 
 class Goal(Protocol):
-    """Something that a loop is to reach.
+    """Goal of a loop.
 
     Attributes
     ----------
@@ -129,10 +129,10 @@ class QuantitySd(_Smaller):
 
     def __post_init__(self) -> None:
         if self.quantity not in BODY_QUANTITIES:
-            problem = f"{self.quantity!r} is no quantity of a body"
-            raise InputError(problem, place="wanted sd", remedy=f"Name one of {', '.join(BODY_QUANTITIES)}")
+            problem = f"{self.quantity!r} is not a quantity of a body"
+            raise InputError(problem, place="required sd", remedy=f"Name one of {', '.join(BODY_QUANTITIES)}")
         if not 0.0 < self.target < np.inf:
-            raise InputError(f"{self.target:g} is no sd", place="wanted sd", remedy="Give a positive number")
+            raise InputError(f"{self.target:g} is not a valid sd", place="required sd", remedy="Give a positive number")
 
     @property
     def text(self) -> str:
@@ -147,14 +147,14 @@ class QuantitySd(_Smaller):
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the standard deviation of the draws."""
         if self.body not in knowledge.bodies:
-            problem = f"{self.body!r} is no body to identify"
-            raise InputError(problem, place="wanted sd", remedy=f"Name one of {', '.join(knowledge.bodies)}")
+            problem = f"{self.body!r} is not a body to identify"
+            raise InputError(problem, place="required sd", remedy=f"Name one of {', '.join(knowledge.bodies)}")
         return float(knowledge.bodies[self.body].sd[list(BODY_QUANTITIES).index(self.quantity)])
 
 
 @dataclass(frozen=True)
 class TipRegion(_Smaller):
-    """Longest semi-axis of the region that holds the end-effector with 95 % where the last manoeuvre, repeated, ends.
+    """Longest semi-axis of the 95 % region of the end-effector at the end of the last manoeuvre, if repeated.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class TipRegion(_Smaller):
 
     target: float
     frame: str | None = None
-    text = "95 % region of the end-effector where the last manoeuvre ends, longest semi-axis"
+    text = "longest semi-axis of the 95 % region of the end-effector at the end of the last manoeuvre"
     unit = "m"
 
     def value(self, knowledge: StepKnowledge) -> float:
@@ -185,7 +185,7 @@ class CauseProbability:
     cause : str
         Label of an effect of the catalogue, or ``"unknown"``.
     target : float
-        Probability from which it is taken to be there, or not there.
+        Probability above which the cause is taken to be present; below one minus it, absent.
     """
 
     cause: str
@@ -196,7 +196,7 @@ class CauseProbability:
     def __post_init__(self) -> None:
         if not 0.5 < self.target < 1.0:
             raise InputError(
-                f"{self.target:g} is no probability that decides", place="wanted cause", remedy="Give 0.9 to 0.99"
+                f"{self.target:g} is not a decisive probability", place="requested cause", remedy="Give 0.9 to 0.99"
             )
 
     @property
@@ -207,8 +207,10 @@ class CauseProbability:
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the probability."""
         if self.cause not in knowledge.causes:
-            problem = f"{self.cause!r} is no candidate of the diagnosis"
-            raise InputError(problem, place="wanted cause", remedy=f"Name one of {', '.join(sorted(knowledge.causes))}")
+            problem = f"{self.cause!r} is not a candidate of the diagnosis"
+            raise InputError(
+                problem, place="requested cause", remedy=f"Name one of {', '.join(sorted(knowledge.causes))}"
+            )
         return knowledge.causes[self.cause]
 
     def reached(self, value: float) -> bool:

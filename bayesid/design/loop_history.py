@@ -40,7 +40,7 @@ class History:
 
     @classmethod
     def open(cls, folder: Path, key: str, *, reviewed: bool = False) -> History:
-        """Read the history that an earlier run left in a folder, as far as its files exist.
+        """Read the history of an earlier run from a folder, up to the last existing file.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class History:
         self.write()
 
     def note(self, number: int, name: str, content: Any) -> None:
-        """Note something that follows from the stages of a step, and is computed anew whenever the loop is run.
+        """Note something that follows from the stages of a step, and is recomputed whenever the loop is run.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class History:
                     raise InputError(
                         f"the {stage} of step {number} was changed after it was used",
                         file=self.path(number, stage),
-                        remedy="Put it back, or start again in another folder",
+                        remedy="Restore it, or start again in another folder",
                     )
                 kept[stage] = step[stage]
             if len(kept) > 1:

@@ -62,7 +62,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a design; only those given apply, besides the joint ranges and speeds of the robot.
+    """Limits of a design in addition to the joint ranges and speeds of the robot; omitted limits do not apply.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class Plan:
     encoder_sigma : tuple of float
         Standard deviation of the position samples of each joint [rad or m]; zero or none for exact joints.
     wheel_speeds : mapping of str to SampledCurve
-        Planned speeds (n, 1) of the wheels [rad/s]; those left out are at rest.
+        Planned speeds (n, 1) of the wheels [rad/s]; omitted wheels are at rest.
     """
 
     model: Model

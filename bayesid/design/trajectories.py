@@ -211,7 +211,7 @@ class _PerJoint(Linear):
         self.moving = tuple(moving)
         self.duration = float(duration)
         if not self.moving:
-            raise InputError("no joint is to move", remedy="Name at least one joint under design.joints")
+            raise InputError("no joint is selected to move", remedy="Name at least one joint under design.joints")
         self.names = tuple(f"joint{joint + 1}.{label}" for joint in self.moving for label in labels)
         self.scale = np.full(len(self.names), 0.5)
         self.centre = np.zeros(len(self.names))

@@ -51,7 +51,7 @@ class Search:
     iterations : int
         Largest number of iterations of SLSQP from each.
     exchanges : int
-        Number of further starts, the best motions so far with the courses of some joints exchanged.
+        Number of further starts, the best motions so far with the motions of some joints exchanged.
     loosened : float
         Factor on the limits of a short descent with which those from random starts begin, where it is above one.
     tolerance : float
@@ -109,9 +109,9 @@ def optimise(
     search : Search
         Effort of the search.
     first : sequence of (n,) arrays
-        Parameters to start from besides the random starts.
+        Parameters to start from in addition to the random starts.
     points : list of (n,) arrays, optional
-        Points of the unknowns over which the criterion is averaged, by default as many draws as it wants.
+        Points of the unknowns over which the criterion is averaged, by default as many draws as it requires.
     known : callable
         Function of the name of a descent that returns parameters, cost and evaluations of it in an earlier run, or
         None.
@@ -167,10 +167,10 @@ def _ranked(done: Sequence[Refined], problem: Problem) -> list[Refined]:
             ranked.append(descent)
     if not ranked:
         raise InputError(
-            f"no manoeuvre of the family {problem.plan.family.name!r} was found within the limits: "
+            f"no manoeuvre of the family {problem.plan.family.name!r} satisfies the limits: "
             f"{_describe(problem, done[0].parameters)}",
             place="design.limits",
-            remedy="Loosen these limits, allow more time, or move other joints",
+            remedy="Relax these limits, allow more time, or move other joints",
         )
     return ranked
 
@@ -250,7 +250,7 @@ class _Work:
         self.progress(
             self.done / self.total,
             f"{self.criterion.name}: best {self.best:.4g}, {self.evaluations / spent:.0f} evaluations/s, "
-            f"{left:.0f} s left",
+            f"{left:.0f} s remaining",
         )
 
 
@@ -260,7 +260,7 @@ def _describe(problem: Problem, parameters: Floats) -> str:
         limit = problem.applied[index]
         if fraction > max(1.0 + SLACK, largest.get(limit.name, (0.0, ""))[0]):
             unit = "" if limit.unit == "1" else f" {limit.unit}"
-            text = f"{limit.name} {fraction * limit.bound:.4g}{unit} where {limit.bound:.4g} is allowed"
+            text = f"{limit.name} {fraction * limit.bound:.4g}{unit}, allowed {limit.bound:.4g}"
             largest[limit.name] = (float(fraction), text)
     return "; ".join(text for _, text in largest.values())
 
@@ -272,7 +272,7 @@ class Store:
     Parameters
     ----------
     file : Path or None
-        JSON file of the results; None keeps them in memory only.
+        JSON file of the results; None stores them in memory only.
     key : str
         Key of the design problem; results under another key are discarded.
     results : dict
@@ -288,7 +288,7 @@ class Store:
 
     @classmethod
     def forgetful(cls) -> Store:
-        """Return a store that keeps the results in memory only."""
+        """Return a store in memory only."""
         return cls(None, "")
 
     @classmethod

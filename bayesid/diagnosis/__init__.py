@@ -1,6 +1,6 @@
 """What the simulation gets wrong: candidates, their signatures, the probability of every set of causes, the gain.
 
-Names are loaded when they are first used (PEP 562): whoever needs the evidence of a Gram alone loads no simulation.
+Names are loaded on first use (PEP 562), so that the evidence of a Gram can be used without loading the simulation.
 """
 
 from __future__ import annotations

@@ -55,29 +55,29 @@ def diagnose(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Show what a model gets wrong about recordings, and name the cause.
+    """Determine what a model gets wrong about recordings, and name the cause.
 
-    The verdict is on the motion; joint torques are read after it (`read_torques`), unless something that has no name
-    moves the base.
+    The verdict is on the motion; joint torques are evaluated after it (`read_torques`), unless an unnamed cause moves
+    the base.
 
     Parameters
     ----------
     model : Model
     manoeuvres : sequence of Manoeuvre
     seed : int
-        Every random number follows from it.
+        Seed of every random number.
     effects : sequence of Effect, optional
-        Candidates; by default all of the catalogue that could exist (`candidates`).
+        Candidates; by default all effects of the catalogue that could exist (`candidates`).
     bounds : mapping of str to sequence of PhysicalBound, optional
-        Largest sizes that the user knows better, by the candidates' labels.
+        Largest sizes that replace those of the catalogue, by the candidates' labels.
     prior : CausePrior, optional
-        Prior of the number of causes, and of something generic.
+        Prior of the number of causes, and of something outside the catalogue.
     settings : DiagnosisSettings, optional
-        Thresholds by which it decides.
+        Thresholds of the decisions.
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
     executor : concurrent.futures.Executor, optional
-        Executor of the refits without each of the recordings; by default they run one after the other.
+        Executor for the refits that omit each of the recordings; by default they run one after the other.
     progress : Progress, optional
 
     Raises
@@ -182,7 +182,7 @@ def identify_extended(
     diagnosis : Diagnosis
     seed : int
     effective_samples : float
-        Size of the sample that is worth as many independent draws.
+        Number of independent draws to which the sample is equivalent.
     progress : Progress, optional
     """
     return identify(

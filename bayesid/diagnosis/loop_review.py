@@ -24,13 +24,13 @@ class DiagnosisReview:
     Parameters
     ----------
     bounds : mapping of str to sequence of PhysicalBound
-        Largest sizes that the user knows, by the candidates' labels.
+        Largest sizes that replace those of the catalogue, by the candidates' labels.
     prior : CausePrior
-        Prior of the number of causes, and of something generic.
+        Prior of the number of causes, and of something outside the catalogue.
     knows_latitude : bool
         Whether the manoeuvres' argument of latitude is known.
     settings : DiagnosisSettings
-        Thresholds by which it decides.
+        Thresholds of the decisions.
     """
 
     bounds: Mapping[str, Sequence[PhysicalBound]] = field(default_factory=dict)

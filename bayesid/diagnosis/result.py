@@ -55,7 +55,7 @@ class Diagnosis(ShortForm):
     before : Hypothesis
         The present model.
     after : Hypothesis
-        The extended model; the present one where nothing is named.
+        The extended model; the present one if nothing is named.
     search : ModelSearch
         Every set of causes with its probability.
     classes : tuple of tuples of str
@@ -66,11 +66,11 @@ class Diagnosis(ShortForm):
     gain : Gain
         Present model against the extended one.
     disturbance : DisturbingWrench
-        What it would take in the present model.
+        Torque and force on the base that would explain the residual of the present model.
     unexplained : DisturbingWrench
-        Left by the named causes, or by the present model where none is named.
+        The same for the residual with the named causes, or of the present model if none is named.
     torques : TorqueReading, TorquesNotRead or None
-        What the joint torques say beyond the motion, or why they were not read; None where the study has none.
+        What the joint torques add to the motion, or why they were not evaluated; None if the study has none.
     effects : tuple of Effect
         Candidates of the catalogue.
     bounds : mapping of str to tuple of PhysicalBound
@@ -79,13 +79,13 @@ class Diagnosis(ShortForm):
     seconds : dict of str to float
         Time by phase.
     identification : Identification or None
-        Of the extended model, where it was sampled.
+        Of the extended model, if it was sampled.
     not_sampled : str or None
-        Why the extended model was not sampled, where that failed.
+        Why the sampling of the extended model failed.
     next_manoeuvre : Design or None
-        Manoeuvre that would decide an undecided verdict, where it was designed.
+        Manoeuvre that would decide an undecided verdict, if it was designed.
     advice : str or None
-        What to fly next, or why that was not designed.
+        What to fly next, or why no manoeuvre was designed.
     """
 
     before: Hypothesis
@@ -114,7 +114,7 @@ class Diagnosis(ShortForm):
 
     @property
     def remainder(self) -> Remainder:
-        """Whether something acts beside the named causes, and how probable that is."""
+        """Whether something acts in addition to the named causes, and how probable that is."""
         return self.verdict.remainder
 
     @property
@@ -124,7 +124,7 @@ class Diagnosis(ShortForm):
 
     @property
     def alarm(self) -> FamilyAlarm:
-        """Whether data hold more than the declared noise."""
+        """Whether the data contain more than the declared noise."""
         return self.search.alarm
 
     @property
@@ -154,16 +154,16 @@ class Diagnosis(ShortForm):
 
     @property
     def bounded(self) -> str | None:
-        """What is weighed in a part of many recordings alone, None where everything is weighed in all of them."""
+        """What is weighed in only a part of many recordings, None if everything is weighed in all of them."""
         count = len(self.recordings)
         if count <= FULL:
             return None
         return (
-            f"With {count} recordings the work on each is bounded: smooth disturbances of all speeds are weighed in "
-            f"{FEW} of them, slow ones in all; pulses and jumps at fewer instants; causes with a history of their own "
-            "in each recording, such as a wheel's, are no candidates; the disturbance is reconstructed in the "
-            f"{FULL} with the largest residuals; the held-out score leaves out {FOLDS} groups of recordings, by one "
-            "linear step."
+            f"With {count} recordings the effort for each is limited: smooth disturbances of all speeds are weighed in "
+            f"{FEW} of them, slow ones in all; pulses and jumps at fewer instants; causes with a separate time history "
+            "in each recording, such as that of a wheel, are not candidates; the disturbance is reconstructed in the "
+            f"{FULL} recordings with the largest residuals; the left-out score omits {FOLDS} groups of recordings in "
+            "turn, by one linear step."
         )
 
     @property
@@ -173,13 +173,13 @@ class Diagnosis(ShortForm):
 
     @property
     def alternatives(self) -> tuple[tuple[str, ...], ...]:
-        """Explanations that the verdict names, its own causes first; none where it names nothing."""
+        """Explanations that the verdict names, those of `verdict.causes` first; none if it names nothing."""
         verdict = self.verdict
         return (verdict.causes, *verdict.ambiguous_with) if verdict.causes else ()
 
     @property
     def differing_causes(self) -> tuple[str, ...]:
-        """Causes that only some of the alternatives of the verdict hold, the most probable alternative first."""
+        """Causes that only some of the verdict's alternatives contain, the most probable alternative first."""
         if len(self.alternatives) < 2:
             return ()
         common = set.intersection(*map(set, self.alternatives))
@@ -188,7 +188,7 @@ class Diagnosis(ShortForm):
 
     @property
     def rivals(self) -> tuple[str, str] | None:
-        """Two causes that the next manoeuvre should tell apart; None where the verdict has none of unknown size.
+        """Two causes that the next manoeuvre should separate; None if the verdict has none of unknown size.
 
         They are the first two in which the alternatives of an ambiguous verdict differ, and the most probable two
         classes of an unresolved one.
@@ -208,7 +208,7 @@ class Diagnosis(ShortForm):
 
     @property
     def unseen_candidates(self) -> tuple[Candidate, ...]:
-        """Candidates that these manoeuvres could hardly have shown, the least visible first."""
+        """Candidates that these manoeuvres could hardly have detected, the least visible first."""
         least = self.settings.weak_power
         weak = [(row.power, row) for row in self.candidates if row.power is not None and row.power < least]
         return tuple(row for _, row in sorted(weak, key=lambda entry: entry[0]))
@@ -252,15 +252,15 @@ class Diagnosis(ShortForm):
 
     @property
     def start(self) -> Floats:
-        """The mode found, as a starting point for `posterior`."""
+        """The mode of the fit, as a starting point for `posterior`."""
         return extended_start(self.after, self.posterior)
 
     def class_of(self, cause: str) -> tuple[str, ...]:
-        """Return the causes that change the model as one does, as far as the data can tell, itself among them."""
+        """Return the causes that the data cannot distinguish from one, including that cause itself."""
         return next((tuple(members) for members in self.classes if cause in members), (cause,))
 
     def probability_of(self, names: Sequence[str]) -> float:
-        """Return the probability that all of some causes are at work, whatever accompanies them; of none, of nothing.
+        """Return the probability that all given causes are at work, whatever accompanies them; of none, of nothing.
 
         Parameters
         ----------
@@ -284,7 +284,7 @@ class Diagnosis(ShortForm):
         return self.probabilities.of_any(self.class_of(cause))
 
     def sizes_of(self, cause_set: CauseSet) -> list[GroupSize]:
-        """Return the sizes of all causes of a set beside their bounds, by cause and group of amplitudes."""
+        """Return the sizes of all causes of a set with their bounds, by cause and group of amplitudes."""
         return group_sizes(cause_set, self.search.under(cause_set.causes), self.bounds, self.candidates)
 
     def fitted(self, causes: Sequence[str]) -> Hypothesis:
@@ -292,7 +292,7 @@ class Diagnosis(ShortForm):
         return self.search.under(causes).fit(causes, self.effects) if causes else self.before
 
     def summary(self) -> Summary:
-        """Return the verdict, what it gains, and the candidates that are named or probable to one per cent."""
+        """Return the verdict, its gain, and the candidates that are named or have a probability of one per cent."""
         verdict, probabilities, gain = self.verdict, self.probabilities, self.gain
         named = [
             f"{name} (probability {format_probability(self.cause_probability(name))})"
@@ -302,7 +302,7 @@ class Diagnosis(ShortForm):
         sentences = [
             f"Verdict: {verdict.status.value}" + (f", {joined(named)}." if named else "."),
             f"Probability of nothing {format_probability(probabilities.nothing)}, of something outside the catalogue "
-            f"{format_probability(probabilities.unknown)}, beside the named causes "
+            f"{format_probability(probabilities.unknown)}, in addition to the named causes "
             f"{format_probability(self.remainder.probability)}.",
             f"Chi-square per sample {gain.before.chi2_per_sample:.4g}"
             + (f", with the causes {gain.after.chi2_per_sample:.4g}." if named else "."),

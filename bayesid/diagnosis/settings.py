@@ -1,6 +1,6 @@
-"""Every number by which a diagnosis decides something, beside the prior of causes and their bounds.
+"""Every number by which a diagnosis decides something, except the prior of causes and their bounds.
 
-Numbers that only say how finely something is computed, such as nodes, steps and tolerances, stand beside their code.
+Numbers that only set how finely something is computed, such as nodes, steps and tolerances, are next to their code.
 """
 
 from __future__ import annotations
@@ -23,73 +23,72 @@ class DiagnosisSettings:
     Attributes
     ----------
     alarm_level : float
-        Probability of an alarm where nothing is lacking, all candidates and tests of the noise together. Of a hundred
-        studies that lack nothing, one is not called adequate.
+        Probability of an alarm if the model lacks nothing, over all candidates and tests of the noise together. Of a
+        hundred studies that lack nothing, one is not called adequate.
     named_from : float
-        Probability of its class from which on a cause is named without rivals. With the prior of 0.1 for one cause, at
+        Probability of its class from which a cause is named without rivals. With the prior of 0.1 for one cause, at
         most one study in 73 that lacks nothing names one (`CausePrior`).
     covered : float
-        Probability that the alternatives of an ambiguous verdict have together.
+        Total probability of the alternatives of an ambiguous verdict.
     most_alternatives : int
-        Alternatives that are named; where more are needed, none is, since a longer list decides nothing.
+        Largest number of alternatives that are named; if more are needed, none is, since a longer list decides nothing.
     most_beside_unnamed : int
-        Causes that are named where something without a name is at work: more of them are what several of the catalogue
-        make of one effect from outside.
+        Largest number of causes that are named if an unnamed cause is at work: more of them occur if several causes of
+        the catalogue imitate one effect from outside.
     unknown_from : float
-        Probability of something generic above which it is present: the majority.
+        Probability of a generic candidate above which it is present: the majority.
     remainder_from : float
-        Probability of something generic from which the named causes explain the data only partly: what `named_from`
-        leaves to all that is not named.
+        Probability of a generic candidate from which the named causes explain the data only partly: the complement of
+        `named_from`.
     visible_information : float
-        Information on amplitudes at the bound of their scale, in the most visible direction, from which on the data see
-        a difference between two causes: one, where posterior and prior are equally wide.
+        Information on amplitudes at the bound of their scale, in the most visible direction, from which the data reveal
+        a difference between two causes: one, at which posterior and prior are equally wide.
     suspect_p_value : float
-        Local p-value of a test of the noise below which the fault is weighed as a cause. Larger than the alarm's, since
-        the fault has its evidence weighed and charged anyway.
+        Local p-value of a test of the noise below which the fault is weighed as a cause. It is larger than that of the
+        alarm, since the evidence of the fault is computed and penalised in any case.
     fault_far_behind : float
-        Nats by which the sets under a fault may be expected to stay behind the best explanation to be weighed; further
-        back they have less than 1 part in 20,000 of its probability.
+        Nats by which the sets with a fault may be expected to fall behind the best explanation and still be weighed;
+        beyond, they have less than 1 part in 20,000 of its probability.
     fault_estimate_far_behind : float
-        Nats by which a fault as first estimated, before it is refined, may be behind the best explanation.
+        Nats by which the first estimate of a fault, before it is refined, may be behind the best explanation.
     fault_alone_far_behind : float
         Nats by which a refined fault without causes may be behind it.
     outlying : float
         Whitened residual from which a sample counts as an outlier [standard deviations]; noise has one in 150,000.
     event_level : float
-        Probability of as many coincident outliers by chance below which they are an event and no fault of the noise.
+        Probability of as many coincident outliers by chance below which they are an event and not a fault of the noise.
     matters : float
-        Probability from which a set is evaluated anew under other ranges of the scales: a third of a per cent.
+        Probability from which a set is re-evaluated under other ranges of the scales: a third of a per cent.
     agrees : float
-        Difference between the cost of a fit and its linear prediction below which the linear evidence stands [nats].
+        Difference between the cost of a fit and its linear prediction below which the linear evidence is valid [nats].
     most_linearisations : int
-        Linearisations about the best set, of which the third hardly changes anything.
+        Largest number of linearisations about the best set; the third hardly changes anything.
     cannot_be_left_out : float
-        Log evidence of a cause beside the others of a fit from which no linear model can leave it out [nats]: that of
-        ten standard deviations.
+        Log evidence of a cause added to the others of a fit from which no linear model can omit it [nats]: that of ten
+        standard deviations.
     plausible : float
-        Probability from which a vibration is tuned and fitted, and the instants of a jump are sought.
+        Probability from which a vibration is tuned and fitted, and the instants of a jump are searched for.
     vibration_far_behind : float
-        Nats behind the best vibration from which the fit of another is not followed to its end.
+        Nats behind the best vibration from which the fit of another is not completed.
     restart_from : float
-        Difference from the predicted cost beyond which a fit in amplitudes is started anew from the prior's centre
-        [nats].
+        Difference from the predicted cost beyond which a fit in amplitudes is restarted from the prior's centre [nats].
     fitted_in_full_from : float
-        Probability from which a set is fitted in full and judged by what it leaves.
+        Probability from which a set is fitted in full and judged by its residual.
     most_full_fits : int
-        Sets that are fitted in full, the most probable first.
+        Largest number of sets that are fitted in full, the most probable first.
     bodies_improbable : float
-        Prior probability of bodies as far from their centre as a fit has them, below which they stand in for something
-        that the model lacks.
+        Prior probability of bodies as far from their centre as in a fit, below which they compensate for something that
+        the model lacks.
     misfit : float
-        Chi-square per sample below which a fit follows the data, whatever it makes of the bodies.
+        Chi-square per sample below which a fit follows the data, regardless of its bodies.
     frame_advantage : float
-        Advantage in twice the log likelihood that names the axes in which a disturbance keeps its direction.
+        Advantage in twice the log likelihood that names the axes in which the direction of a disturbance is fixed.
     frame_share : float
         Share of what three free axes explain that one fixed direction must explain to be named.
     weak_power : float
-        Power below which a candidate could hardly have been seen.
+        Power below which a candidate could hardly have been detected.
     trusted_from : float
-        Probability that nothing is lacking from which on a loop trusts its model in spite of an alarm.
+        Probability that nothing is lacking from which a loop trusts its model in spite of an alarm.
     """
 
     alarm_level: float = 0.01

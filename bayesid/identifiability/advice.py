@@ -179,10 +179,12 @@ def candidates(model: Model) -> list[AddedMeasurement]:
         text = "torque sensors with a tenth of their noise"
         additions.append(AddedMeasurement("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
     elif (torques := typical_torque(model)) is not None:
-        text = f"added torque sensors of {torques.sigma[0]:g} N m per sample in all joints, their friction known"
+        text = f"added torque sensors of {torques.sigma[0]:g} N m per sample in all joints, with known friction"
         additions.append(AddedMeasurement("add-torque", text, partial(_torqued, torques)))
     additions += [
-        AddedMeasurement(f"known-mass:{body.name}", f"mass of {body.name} known to 1 %", partial(_weighed, body.name))
+        AddedMeasurement(
+            f"known-mass:{body.name}", f"mass of {body.name} known with 1 % uncertainty", partial(_weighed, body.name)
+        )
         for body in model.bodies
     ]
     return [
@@ -319,14 +321,14 @@ def _with_swing(robot: Robot, index: int, manoeuvre: Manoeuvre) -> Manoeuvre:
     """Return the manoeuvre with an added swing of a joint, to whichever side the joint's range allows."""
     motion, joint, time = manoeuvre.motion, robot.joints[index], manoeuvre.recording.time
     if not isinstance(motion, MeasuredMotion):
-        raise NotEvaluated("the joints' motion is not that of a recording")
+        raise NotEvaluated("the joint motion does not come from a recording")
     for side in (1.0, -1.0):
         changed = Swung(motion.joints, motion.names, index, side * SWING[joint.unit], float(time[-1]))
         state = changed.evaluate(time)
         position, speed = state.position[:, index], np.abs(state.velocity[:, index])
         if joint.lower <= position.min() and position.max() <= joint.upper and speed.max() <= SHARE * joint.velocity:
             return replace(manoeuvre, motion=changed)
-    raise NotEvaluated(f"it would leave the range or the speed of {joint.name}")
+    raise NotEvaluated(f"it would exceed the range or the speed limit of {joint.name}")
 
 
 # ---- sizes ----

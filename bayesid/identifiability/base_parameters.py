@@ -54,7 +54,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 FAINT = 1e-3
 GAP = 1e3  # smallest ratio of the last singular value kept to the first dropped at which the rank counts as determined
 # remedy in the errors of this module: nearly dependent columns come from nearly degenerate geometry
-REMEDY = "Look for joints that are almost, but not quite, parallel or on one axis"
+REMEDY = "Check for joints that are almost, but not exactly, parallel or collinear"
 SEED = 1991  # seed of the random states where no generator is given, so that results repeat
 
 
@@ -196,8 +196,8 @@ def _checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
     dropped = float(values[rank] / values[0]) if rank < len(values) else 0.0
     if len(ranks) > 1 or kept < GAP * dropped:
         raise InputError(
-            f"the number of base parameters cannot be told: {' or '.join(map(str, sorted(ranks)))}, with relative "
-            f"singular values {kept:.2g} and {dropped:.2g} on both sides",
+            f"the number of base parameters is ambiguous: {' or '.join(map(str, sorted(ranks)))}, with relative "
+            f"singular values of {kept:.2g} and {dropped:.2g} on either side",
             remedy=REMEDY,
         )
     return kept, dropped
@@ -224,7 +224,7 @@ def regrouping(matrix: Floats, independent: Sequence[int], dependent: Sequence[i
     beta[np.abs(beta) < ZERO] = 0.0
     worst = float(np.abs(second - first @ beta).max(initial=0.0))
     if worst > 10.0 * ZERO:
-        raise InputError(f"the dependent parameters regroup only to {worst:.2g}", remedy=REMEDY)
+        raise InputError(f"the dependent parameters regroup only with an error of {worst:.2g}", remedy=REMEDY)
     return beta
 
 
@@ -316,7 +316,7 @@ def base_parameters(
     Parameters
     ----------
     robot : Robot
-        Robot whose inertial values do not matter, except that links without mass are left out.
+        Robot whose inertial values do not matter, except that links without mass are omitted.
     base : Base
         Support of the base, which decides the equations.
     rng : numpy.random.Generator, optional

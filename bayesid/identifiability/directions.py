@@ -152,11 +152,11 @@ def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool
     what, ratio = subject(direction, values, prior_sd, whole), direction.sd / direction.prior_sd
     verdict = direction.verdict
     if verdict is ContractionVerdict.NOT:
-        shared = "cannot be told apart" if " against " in what else "not learnt"
-        return f"{what}: {shared}, {_percent(ratio)} of the prior's width is left"
+        shared = "cannot be distinguished" if " against " in what else "not learnt"
+        return f"{what}: {shared}, {_percent(ratio)} of the prior's width remains"
     if verdict is ContractionVerdict.WEAKLY:
-        return f"{what}: weakly learnt, {_percent(ratio)} of the prior's width is left"
-    return f"{what}: known to {_percent(ratio)} of the prior's width"
+        return f"{what}: weakly learnt, {_percent(ratio)} of the prior's width remains"
+    return f"{what}: learnt, {_percent(ratio)} of the prior's width remains"
 
 
 def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
@@ -228,12 +228,12 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
     if all(contraction.verdict is not ContractionVerdict.CONTRACTED for contraction in result.contraction.values()):
         sentences.append(f"These recordings do not determine {abridged(list(result.bodies))}.")
     for verdict, text in (
-        (ContractionVerdict.NOT, "is the prior"),
-        (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),
+        (ContractionVerdict.NOT, "equals the prior"),
+        (ContractionVerdict.WEAKLY, "depends more on the prior than on the data"),
     ):
         names = [name for name, contraction in result.contraction.items() if contraction.verdict is verdict]
         if names:
-            sentences.append(f"What is said of {abridged(names)} {text}.")
+            sentences.append(f"The posterior of {abridged(names)} {text}.")
     knowledge = Knowledge.at(result.posterior, result.optimum.z)
     subjects = [
         subject(direction, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
@@ -241,5 +241,5 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
         if direction.verdict is ContractionVerdict.NOT
     ]
     if subjects:
-        sentences.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")
+        sentences.append(f"The data do not determine these directions: {abridged(subjects, separator='; ')}.")
     return sentences

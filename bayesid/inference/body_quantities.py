@@ -84,7 +84,7 @@ class QuantityDraws(ShortForm):
         return float(self.draws.std(ddof=1))
 
     def interval(self, share: float = 0.95) -> tuple[float, float]:
-        """Return the ends of the central interval that holds a share of the draws."""
+        """Return the ends of the central interval that contains a share of the draws."""
         low, high = np.quantile(self.draws, [0.5 - 0.5 * share, 0.5 + 0.5 * share]).tolist()
         return low, high
 

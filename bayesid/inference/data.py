@@ -560,13 +560,13 @@ def _series(recording: Recording, family: str, axes: Sequence[str]) -> Series:
         raise InputError(
             f"no column {family}.{'|'.join(absent)}, but the study declares the sensor",
             file=recording.file or recording.name,
-            remedy="Record the sensor or take it out of [sensors]",
+            remedy="Record the sensor or remove it from [sensors]",
         )
     time, values = recording.vector(family, tuple(axes))
     if len(time) < FEWEST:
         raise InputError(
             f"only {len(time)} samples of {family}",
             file=recording.file or recording.name,
-            remedy=f"Record at least {FEWEST}, or take the sensor out of [sensors]",
+            remedy=f"Record at least {FEWEST}, or remove the sensor from [sensors]",
         )
     return time, values

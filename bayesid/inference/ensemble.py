@@ -156,14 +156,14 @@ class Chains:
 
     @property
     def stuck(self) -> bool:
-        """Whether hardly any proposal was accepted, so that the walkers have not left where they started."""
+        """Whether almost no proposal was accepted, so that the walkers remain near their starting points."""
         return self.acceptance < STUCK and self.autocorrelation >= self.steps >= STUCK_AFTER
 
     @property
     def origin(self) -> str:
         """How the draws were made, as part of a sentence."""
         if np.isnan(self.acceptance):
-            return f"a sampler of the user's, {len(self.y)} chains of {self.steps} draws"
+            return f"a user-supplied sampler, {len(self.y)} chains of {self.steps} draws"
         accepted = f"{100.0 * self.acceptance:.0f} % of the proposals accepted"
         return f"emcee, {len(self.y)} independent ensembles of {self.walkers} walkers, {self.steps} steps, {accepted}"
 
@@ -213,8 +213,8 @@ def sample(
     proposal : Proposal, optional
         Approximation of which independence moves propose, by default a Student-t about the mode.
     file : path or emcee.backends.HDFBackend, optional
-        HDF5 file of emcee that keeps every step, in groups ``ensemble-0`` and so on, or of the backend's name and the
-        same numbers; if it holds a part of the same run, sampling goes on from there.
+        HDF5 file in which emcee stores every step, in groups ``ensemble-0`` and so on, or of the backend's name and the
+        same numbers; if it contains a part of the same run, sampling resumes from it.
     progress : Progress, optional
         Function that is called after every block of steps.
     """

@@ -190,7 +190,7 @@ class Identification(ShortForm):
 
     @cached_property
     def starts(self) -> tuple[StartState, ...]:
-        """Unknown initial rates and rotations of the base; rates with what the encoders' noise leaves open of them."""
+        """Unknown initial rates and rotations of the base; rates include the uncertainty caused by encoder noise."""
         unknowns, values = self.posterior.unknowns, self.posterior.unknowns.values_of(self.chains.flat)
         states = []
         for index, manoeuvre in enumerate(self.posterior.manoeuvres):
@@ -256,7 +256,7 @@ class Identification(ShortForm):
 
     @cached_property
     def integration_error(self) -> float:
-        """Largest error of any sample due to the integration step, in standard deviations of the sample."""
+        """Largest error of any sample caused by the integration step, in standard deviations of the sample."""
         return integration_error_at(self.posterior, self.optimum.z)
 
     @property
@@ -284,7 +284,7 @@ class Identification(ShortForm):
         else:
             sentences.append(
                 f"Importance sampling is not evaluated: Pareto k-hat {self.evidence.pareto_k:.2f} is above 0.7, "
-                "so the evidence may not be trusted."
+                "so the evidence is not reliable."
             )
         for method, other_mean, other_sd in methods:
             shift = np.abs(mean - other_mean) / sd
@@ -300,8 +300,8 @@ class Identification(ShortForm):
                 f"The sampler has not converged: R-hat {self.chains.r_hat:.3f}, "
                 f"{self.chains.effective_samples:.0f} effective samples after {self.chains.steps} steps."
                 + (
-                    " Hardly a proposal was accepted: these recordings do not determine the unknowns one by one, only "
-                    "combinations of them far from linear. Record joints that move."
+                    " Almost no proposal was accepted: these recordings do not determine the individual unknowns, only "
+                    "strongly nonlinear combinations of them. Record moving joints."
                     if self.chains.stuck
                     else ""
                 )
@@ -379,7 +379,7 @@ class Identification(ShortForm):
     def summary(self) -> Summary:
         """Return the fit, and mean and standard deviation of every quantity."""
         expected, sd = self.expected_chi2
-        names = joined(self.bodies) or "what is no body"
+        names = joined(self.bodies) or "effects only"
         fit = (
             f"Identification of {names}: {self.posterior.samples} samples, {self.posterior.size} unknowns; chi-square "
             f"{self.optimum.chi2:.0f}, where {expected:.0f} ± {sd:.0f} is expected; "
@@ -429,14 +429,14 @@ def identify(
     start : (n,) array, optional
         Starting point of the search for the mode, by default the prior's centre.
     sampler : Sampler, optional
-        What samples the posterior, by default `Emcee`, whose ``max_steps`` and ``file`` may be given here.
+        Sampler of the posterior, by default `Emcee`, whose ``max_steps`` and ``file`` may be given here.
     effective_samples, max_steps, file, progress
         See `bayesid.inference.sample`.
 
     Raises
     ------
     InputError
-        If no value of the unknowns comes near the data, or the sampler does not return draws of the
+        If no values of the unknowns fit the data, or the sampler does not return draws of the
         posterior; `DivergenceError` where no fit is finite.
     """
     if sampler is not None and file is not None:
@@ -445,9 +445,9 @@ def identify(
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     if not optimum.chi2 < HOPELESS * refined.samples:
         raise InputError(
-            f"no value of the unknowns follows the data: chi-square per sample is {optimum.chi2 / refined.samples:.2g} "
+            f"no values of the unknowns fit the data: chi-square per sample is {optimum.chi2 / refined.samples:.2g} "
             "after the fit, where noise alone gives 1",
-            remedy="See what `bayesid check` and `bayesid diagnose` say of attitudes, units and missing causes",
+            remedy="Run `bayesid check` and `bayesid diagnose` to examine attitudes, units and missing causes",
         )
     rng = np.random.default_rng(weights)
     parameterisation = choose_parameterisation(refined, optimum, rng)
@@ -456,7 +456,7 @@ def identify(
     nearly = parameterisation.proposal(optimum)
     target = SamplingTarget(refined, optimum, parameterisation, nearly, evidence.trusted)
     if evidence.effective_samples < NEARLY_NORMAL * evidence.evaluations:
-        progress(0.0, "looking for a proposal")
+        progress(0.0, "searching for a proposal")
         linear = LinearParameterisation(refined)
         proposal = collapsed_proposal(refined, optimum, rng, effective_samples)
         if proposal is not None and effective_share(linear, proposal, rng) < WORTHLESS:

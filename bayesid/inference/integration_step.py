@@ -68,7 +68,7 @@ def choose_step(
         if np.isinf(error) and step < HOPELESS * coarsest:
             named = f", and the effects {', '.join(effect.label for effect in model.effects)}" if model.effects else ""
             raise InputError(
-                "the simulation gives no finite readings about the prior's centre",
+                "the simulation gives no finite readings near the prior's centre",
                 remedy=f"Check the units of joint motion and of the robot's inertial parameters{named}",
             )
         grids = {step: finer}
@@ -78,7 +78,7 @@ def choose_step(
 
 def _step_error(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
     """Return the error where no step is short enough, with the recorded column of the fastest motion."""
-    problem = "no integration step reaches 1 % of the sensors' noise"
+    problem = "no integration step has an error below 1 % of the sensor noise"
     remedy = "Give rates in rad/s and joints in rad, and check the sensors' sigma"
     speeds_by_column: list[tuple[float, str, Recording, str]] = []
     for manoeuvre in manoeuvres:

@@ -23,7 +23,7 @@ COPIES = 3.0
 """Copies of the tables that exist at once: by recording, stacked, and on the device; beside them those of the step that
 is tried."""
 
-FEWER = "Give fewer or shorter recordings, or fewer blocks per second, or run it where more memory is free"
+FEWER = "Use fewer or shorter recordings, reduce blocks_per_second, or use a machine with more free memory"
 """What helps where memory is lacking."""
 
 

@@ -26,10 +26,10 @@ def refuse_no_motion(posterior: Posterior) -> None:
     """
     if posterior.manoeuvres and all(_nothing_moves(posterior, index) for index in range(len(posterior.manoeuvres))):
         raise InputError(
-            "no joint moves, and the sensors read nothing but constants and noise: nothing is learnt, and the "
-            "posterior is the prior",
+            "no joint moves, and the sensors read only constants and noise: the recordings contain no information, and "
+            "the posterior equals the prior",
             file=posterior.manoeuvres[0].recording.file,
-            remedy="Record a motion; `bayesid design` finds a good one",
+            remedy="Record a motion; `bayesid design` designs one",
         )
 
 

@@ -34,7 +34,7 @@ class Parameterisation(Protocol):
         ...
 
     def log_densities(self, y: Floats) -> Floats:
-        """Return the log posterior density over y, and beside it the log likelihoods of R recordings, (n, 1 + R)."""
+        """Return the log posterior density over y, together with the log likelihoods of R recordings, (n, 1 + R)."""
         ...
 
     def proposal(self, optimum: Optimum) -> StudentT:
@@ -57,7 +57,7 @@ class LogCholeskyParameterisation:
         return self.posterior.log_density(y)
 
     def log_densities(self, y: Floats) -> Floats:
-        """Return the log posterior density, and beside it the log likelihoods of R recordings, shape (n, 1 + R)."""
+        """Return the log posterior density, together with the log likelihoods of R recordings, shape (n, 1 + R)."""
         return self.posterior.log_densities(y)
 
     def proposal(self, optimum: Optimum) -> StudentT:
@@ -80,7 +80,7 @@ class LinearParameterisation:
         return self.log_densities(y)[:, 0]
 
     def log_densities(self, y: Floats) -> Floats:
-        """Return `log_density`, and beside it the log likelihoods of R recordings, shape (n, 1 + R)."""
+        """Return `log_density`, together with the log likelihoods of R recordings, shape (n, 1 + R)."""
         z = self.to_z(y)
         physical = np.all(np.isfinite(z), axis=1)
         inside = np.where(np.isfinite(z), z, 0.0)

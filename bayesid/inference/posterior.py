@@ -57,7 +57,7 @@ class Posterior(ShortForm):
     unknowns : Unknowns
         Unknowns with their prior.
     flat_prior : bool
-        Whether the prior is left out, as in the noise-free comparisons of the paper.
+        Whether the prior is omitted, as in the noise-free comparisons of the paper.
     """
 
     data: Data
@@ -65,7 +65,7 @@ class Posterior(ShortForm):
     flat_prior: bool = False
 
     def summary(self) -> Summary:
-        """Return what is known of the model, and the sizes of the problem."""
+        """Return a description of the model and the size of the problem."""
         counts = (len(self.manoeuvres), "recording"), (self.samples, "sample"), (self.size, "unknown")
         sizes = ", ".join(counted(number, name) for number, name in counts)
         return Summary([*self.model.summary().sentences, f"{sizes}."])
@@ -92,12 +92,12 @@ class Posterior(ShortForm):
             Whether the prior is left out.
         window : int, optional
             Number of earlier blocks on which the whitening conditions each sample, by default the smallest that is
-            accurate. With 0 the correlation of the encoders' noise is left out, which suits a first look at the data.
+            accurate. With 0 the correlation of the encoder noise is omitted, which suits a first look at the data.
 
         Raises
         ------
         InputError
-            If there is no recording, one lacks a sensor that the model declares, a hook of an effect of the user's own
+            If there is no recording, one lacks a sensor that the model declares, a hook of a user-defined effect
             breaks its contract, or memory is lacking.
         """
         for effect in model.effects:
@@ -193,7 +193,7 @@ class Posterior(ShortForm):
         return np.asarray(compiled.residuals(self.structure, self.numbers, on_device(z), self.data.arrays))
 
     def least_squares(self, z: Floats) -> Floats:
-        """Return residuals of which half the sum of squares is minus the log posterior density, up to a constant."""
+        """Return residuals; half their sum of squares is minus the log posterior density, up to a constant."""
         r = self.residuals(z).ravel()
         return r if self.flat_prior else np.concatenate([r, z])
 
@@ -263,7 +263,7 @@ class Posterior(ShortForm):
         return np.asarray(compiled.chi2(self.structure, self.numbers, z, self.data.arrays))
 
     def log_densities(self, z: Floats) -> Floats:
-        """Return `log_density` and beside it the log likelihoods of the R recordings, (n, size) -> (n, 1 + R)."""
+        """Return `log_density` together with the log likelihoods of the R recordings, (n, size) -> (n, 1 + R)."""
         z = np.atleast_2d(z)
         likelihoods = self.log_likelihoods(z)
         total = likelihoods.sum(axis=1) + self.log_prior(z)

@@ -85,7 +85,7 @@ class InertialDraws:
             values = np.array(inertial.transpose("chain", "draw", "body", "parameter").values, dtype=float)
             data.close()
         except (OSError, ValueError, KeyError, AttributeError) as error:
-            raise InputError("it holds no draws of inertial parameters", file=file, remedy=remedy) from error
+            raise InputError("it contains no draws of inertial parameters", file=file, remedy=remedy) from error
         return cls(names, values.reshape(-1, len(names), 10))
 
     def of_bodies(self, names: Sequence[str]) -> InertialDraws:
@@ -93,8 +93,8 @@ class InertialDraws:
         for name in names:
             if name not in self.names:
                 raise InputError(
-                    f"it holds no body {name!r}",
-                    remedy=f"It holds {', '.join(self.names)}; leave {name!r} out, or identify it first",
+                    f"it contains no body {name!r}",
+                    remedy=f"It contains {', '.join(self.names)}; omit {name!r}, or identify it first",
                 )
         return InertialDraws(tuple(names), self.values[:, [self.names.index(name) for name in names]])
 
@@ -121,9 +121,9 @@ class InertialDraws:
         bad = int((np.linalg.eigvalsh(relative)[:, 0] <= 1e-12).sum())
         if bad:
             raise InputError(
-                f"no physical body is left of {change.body} in {bad} of {len(values)} draws after the change by "
+                f"{change.body} is no longer a physical body in {bad} of {len(values)} draws after the change by "
                 f"{change.mass:g} kg",
-                remedy="More is removed than is there: correct mass, com, inertia or mass_sigma of the change",
+                remedy="More is removed than exists: correct mass, com, inertia or mass_sigma of the change",
             )
         return InertialDraws(self.names, values)
 
@@ -173,8 +173,8 @@ def joint_prior(draws: InertialDraws) -> JointPrior:
     count, bodies = draws.values.shape[:2]
     if count < DRAWS_PER_COORDINATE * 10 * bodies:
         raise InputError(
-            f"{count} draws do not give the covariance of {10 * bodies} coordinates",
-            remedy=f"Identify with more samples; {DRAWS_PER_COORDINATE * 10 * bodies} are the least",
+            f"{count} draws are too few for the covariance of {10 * bodies} coordinates",
+            remedy=f"Identify with more samples; {DRAWS_PER_COORDINATE * 10 * bodies} or more are required",
         )
     centres, coordinates = zip(*(_centred(draws.values[:, index]) for index in range(bodies)), strict=True)
     covariance = np.atleast_2d(np.cov(np.concatenate(coordinates, axis=1).T))

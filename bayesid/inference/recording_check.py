@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
+from bayesid._math.threads import each_in_threads
 from bayesid.inference.data import Data
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
@@ -157,7 +158,7 @@ class RecordingCheck:
         sentences = [f"{suspect}" for suspect in self.suspects]
         sentences += [remark for spectrum in self.spectra for remark in spectrum.remarks]
         sentences += [
-            f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
+            f"Joint {joint.name} moves by only {joint.highest - joint.lowest:.2g} {joint.unit}."
             for joint in self.joints
             if joint.still
         ]
@@ -172,21 +173,23 @@ class RecordingCheck:
                 if (off > max(0.3, 4.0 * sensor.sigma_error)).any():
                     sentences.append(
                         f"The noise of {sensor.kind.value} in quiet stretches is "
-                        f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}, declared "
+                        f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}; declared: "
                         f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
                     )
             if sensor.delay is not None and abs(sensor.delay[0]) > 4.0 * sensor.delay[1]:
                 side = "late" if sensor.delay[0] > 0.0 else "early"
                 sentences.append(
-                    f"The samples of {sensor.kind.value} seem {abs(sensor.delay[0]):.3g} ± {sensor.delay[1]:.2g} s "
-                    f"{side} against the joints, or something else is wrong with robot or model."
+                    f"The samples of {sensor.kind.value} appear {abs(sensor.delay[0]):.3g} ± {sensor.delay[1]:.2g} s "
+                    f"{side} relative to the joints; alternatively, the robot or the model is wrong."
                 )
         sentences += [f"Column {column} never changes: it is stuck." for column in self.stuck]
         sentences += [
             f"{family} is recorded, but not declared under [sensors]: it is not used." for family in self.unused
         ]
         if self.rate_is_differenced:
-            sentences.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
+            sentences.append(
+                "The rate is differenced from the attitude, not an independent sensor: declare one of them."
+            )
         for channel in self.channels:
             if channel.longest_gap > 5.0 * channel.interval:
                 sentences.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
@@ -201,11 +204,11 @@ def check_recordings(posterior: Posterior, progress: Progress = silent) -> list[
     posterior : Posterior
     progress : Progress, optional
     """
-    checks = []
-    for index, predicted in enumerate(readings_at_start(posterior)):
-        name = posterior.manoeuvres[index].recording.name
-        progress(index / len(posterior.manoeuvres), f"checking {name}")
-        checks.append(_check(posterior, index, predicted))
+    predicted = readings_at_start(posterior)
+    checks: list[RecordingCheck] = []
+    for check in each_in_threads(lambda index: _check(posterior, index, predicted[index]), range(len(predicted))):
+        checks.append(check)
+        progress(len(checks) / len(predicted), f"{check.name} checked")
     return checks
 
 

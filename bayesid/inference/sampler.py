@@ -22,7 +22,7 @@ __all__ = ["Emcee", "PosteriorDraws", "Sampler", "SamplingTarget", "chains_of"]
 
 @dataclass(frozen=True)
 class SamplingTarget:
-    """Posterior to sample, with what is known of it before.
+    """Posterior to sample, with its mode and approximations.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class PosteriorDraws:
 
 
 class Sampler(Protocol):
-    """What samples the posterior in `identify`."""
+    """Interface of the samplers of `identify`."""
 
     def sample(
         self, target: SamplingTarget, rng: np.random.Generator, *, effective_samples: float, progress: Progress
@@ -97,8 +97,8 @@ class Emcee:
     max_steps : int
         Largest number of steps of each ensemble.
     file : path or emcee.backends.HDFBackend, optional
-        File in emcee's format that keeps every step, in groups ``ensemble-0`` to ``ensemble-3``, or of the backend's
-        name and the same numbers; a run that was interrupted goes on from there.
+        File in emcee's format that stores every step, in groups ``ensemble-0`` to ``ensemble-3``, or of the backend's
+        name and the same numbers; an interrupted run resumes from it.
     max_seconds : float
         Time after which it stops at the next test of convergence, converged or not [s].
     """

@@ -277,8 +277,8 @@ def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
     ]
     if not result:
         raise InputError(
-            f"the low-pass filter needs {len(taps)} evenly spaced samples and none fit",
-            remedy="Raise low_pass or leave it out",
+            f"the low-pass filter needs {len(taps)} evenly spaced samples, but no section of the recording has them",
+            remedy="Raise low_pass or omit it",
         )
     return result
 

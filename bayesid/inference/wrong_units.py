@@ -165,7 +165,7 @@ def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
     if abs(seen.factor) > WRONG_UNIT:
         raise ConventionError(
             _nearest_unit(seen),
-            f"the readings follow the joints' motion but are {seen.factor:.3g} times what it can cause with this robot",
+            f"the readings follow the joints' motion but are {seen.factor:.3g} times what this robot can cause",
             file=recording.file or recording.name,
             place=f"column {seen.column}",
             remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
@@ -192,8 +192,8 @@ def _nearest_unit(seen: _Comparison) -> list[Convention]:
     if not unit or off[unit] > np.log(NEAR):
         line = f"[sensors.{family}]\nscale = {1.0 / abs(seen.factor):.3g}"
         text = (
-            f"The readings of {family} are in no usual unit, as counts are. The factor is estimated with the robot as "
-            "given: take it from the data sheet."
+            f"The readings of {family} are in no standard unit, for example in counts. The factor is estimated from "
+            "the robot model: use the value of the data sheet."
         )
         return [Convention(f"convention:unit:{family}", family, line, text)]
     line, text = f'[sensors.{family}]\nunit = "{unit}"', f"The readings of {family} are in {unit}."
@@ -264,10 +264,10 @@ def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Compari
         line, text = '[sensors.accel]\nunit = "g"', "The readings of accel are in g, not in m/s2."
         raise ConventionError(
             [Convention("convention:unit:accel", "accel", line, text)],
-            "the accelerations agree with the turning of the base only if they are in g",
+            "the accelerations agree with the rotation of the base only if they are in g",
             file=recording.file or recording.name,
             place=f"column {small[0].column}",
-            remedy="Give them in m/s2, or correct the accelerometer's position, which then is ten times too far; or "
+            remedy="Give them in m/s2, or correct the accelerometer's position, which may be ten times too far; or "
             f"state it: {in_one_line(line)}",
         )
 

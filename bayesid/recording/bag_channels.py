@@ -88,16 +88,16 @@ def joint_names(
     known = list(dict.fromkeys(name for names in of_topic for name in names))
     for name in without:
         if name not in known:
-            raise topics[0].error(f"there is no joint {name!r} to leave out", remedy=f"Joints here: {', '.join(known)}")
+            raise topics[0].error(f"there is no joint {name!r} to omit", remedy=f"Joints here: {', '.join(known)}")
     names = tuple(name for name in known if name not in {*without, *wheels})
     if not names:
-        raise topics[0].error("no joint is left", remedy="Name a topic that holds the robot's joints")
+        raise topics[0].error("no joint remains", remedy="Name a topic that contains the robot's joints")
     for name in names:
         holders = [topic for topic, in_topic in zip(topics, of_topic, strict=True) if name in in_topic]
         if len(holders) > 1:
             raise holders[1].error(
-                f"the joint {name!r} is in {holders[0].name} too",
-                remedy=f"Name one of these topics, or leave the joint out: --without {name}",
+                f"the joint {name!r} is also in {holders[0].name}",
+                remedy=f"Name one of these topics, or omit the joint: --without {name}",
             )
     return names
 
@@ -117,11 +117,13 @@ def joint_channels(topic: StampedTopic, names: Sequence[str], *, velocity: bool,
     if velocity or not channels:
         channels |= _joint_family(topic, names, "velocity", "velocity")
     if not channels:
-        raise topic.error("its messages hold neither positions nor velocities", remedy="Name a topic that holds them")
+        raise topic.error(
+            "its messages contain neither positions nor velocities", remedy="Name a topic that contains them"
+        )
     if effort:
         torques = _joint_family(topic, names, "effort", "torque")
         if not torques:
-            raise topic.error("its messages hold no efforts", remedy="Leave --effort out")
+            raise topic.error("its messages contain no efforts", remedy="Omit --effort")
         channels |= torques
     return channels
 
@@ -202,7 +204,7 @@ def imu_channels(topic: StampedTopic, *, accel: bool, gravity: bool = False) -> 
         if not gravity:
             _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"][1] for axis in "xyz"], axis=1))
     if not channels:
-        problem = "its covariances say that it measures neither angular velocity nor acceleration"
+        problem = "its covariances indicate that it measures neither angular velocity nor acceleration"
         raise topic.error(problem, remedy="Name the topic of an IMU that does")
     return channels
 
@@ -232,8 +234,8 @@ def _refuse_gravity(topic: StampedTopic, acceleration: Floats) -> None:
     if unit is None:
         return
     raise topic.error(
-        f"the median magnitude of linear_acceleration is {median:.4g}, gravity in {unit}, which no free robot feels",
-        remedy="Take a topic from which gravity is removed, in m/s2, or leave the accelerometer out: --no-accel",
+        f"the median magnitude of linear_acceleration is {median:.4g}, gravity in {unit}; a free robot measures none",
+        remedy="Use a topic from which gravity is removed, in m/s2, or omit the accelerometer: --no-accel",
     )
 
 
@@ -254,7 +256,7 @@ def attitude_channels(topic: StampedTopic) -> Channels:
     first = topic.messages[0]
     if getattr(first, "orientation_covariance", (0.0,))[0] == NOT_MEASURED:
         raise topic.error(
-            "its covariance says that it does not measure the orientation",
+            "its covariance indicates that it does not measure the orientation",
             remedy="Name the topic of a sensor that does",
         )
     values = np.array([_quaternion(message) for message in topic.messages])

@@ -70,7 +70,7 @@ class TimeWindow:
     def __post_init__(self) -> None:
         if not self.start >= 0.0:
             raise InputError(
-                f"the window starts at {self.start:g} s, before the bag", remedy="Give --start in seconds from 0 on"
+                f"the window starts at {self.start:g} s, before the bag", remedy="Give --start in seconds, 0 or later"
             )
         if self.end is not None and not self.end > self.start:
             problem = f"the window from {self.start:g} to {self.end:g} s is empty"
@@ -105,7 +105,7 @@ class TimeWindow:
         if not all(map(len, stamps)):
             topic = topics[[len(times) for times in stamps].index(0)]
             problem = f"the stamp of the header is zero ({len(topic.messages)} such messages)"
-            remedy = "Have the driver stamp its messages; the time of arrival is no substitute"
+            remedy = "Configure the driver to stamp its messages; arrival times are no substitute"
             raise topic.error(problem, message=0, remedy=remedy)
         first = min(int(times.min()) for times in stamps)
         last = max(int(times.max()) for times in stamps)
@@ -166,13 +166,15 @@ class BagTopics:
 
     def __post_init__(self) -> None:
         if not self.joints and not self.wheels:
-            raise InputError("nothing that moves is named", remedy="Give --joints TOPIC, --wheels TOPIC or both")
+            raise InputError(
+                "neither joints nor wheels are named", remedy="Give --joints TOPIC, --wheels TOPIC or both"
+            )
         if self.imu is None and self.attitude is None:
             raise InputError("no sensor of the base is named", remedy="Give --imu TOPIC, --attitude TOPIC or both")
         # one topic may be both: an IMU may tell its attitude, too
         named = [*self.joints, *{name for name in (self.imu, self.attitude) if name is not None}]
         if not 0.0 <= self.most_faulty < 1.0:
-            problem = f"the largest share of faulty messages is {self.most_faulty:g}"
+            problem = f"the largest fraction of faulty messages is {self.most_faulty:g}"
             raise InputError(problem, place="--most-faulty", remedy="Give a fraction from 0 to below 1")
         if len(set(named)) < len(named):
             raise InputError(f"one topic is named twice: {', '.join(named)}", remedy="Name a topic for each sensor")
@@ -266,7 +268,7 @@ def _during(joints: StampedTopic, topic: StampedTopic, known: tuple[int, int]) -
     """Return the messages of a topic while all joints are known."""
     inside = topic.kept((topic.stamps >= known[0]) & (topic.stamps <= known[1]))
     if not inside.messages:
-        raise topic.error(f"it has no message during those of {joints.name}", remedy="Record both at the same time")
+        raise topic.error(f"it has no message in the period of {joints.name}", remedy="Record both at the same time")
     return inside
 
 
@@ -327,10 +329,11 @@ def _refuse_mixed_clocks(topics: Sequence[StampedTopic]) -> None:
                 topic, f"its stamps are {abs(apart):.6g} s {'ahead of' if apart > 0 else 'behind'} those of", reference
             )
         if topic.stamps[-1] < reference.stamps[0] or topic.stamps[0] > reference.stamps[-1]:
-            raise _error(topic, "it has no time in common with", reference)
+            raise _error(topic, "it does not overlap in time with", reference)
 
 
 def _error(topic: StampedTopic, problem: str, reference: StampedTopic) -> InputError:
     return topic.error(
-        f"{problem} {reference.name}", remedy="Stamp all topics by one clock, either the computer's or the simulation's"
+        f"{problem} {reference.name}",
+        remedy="Stamp all topics with the same clock, either the computer's or the simulation's",
     )

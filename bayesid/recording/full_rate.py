@@ -90,17 +90,17 @@ class ChannelSpectrum:
     def remarks(self) -> tuple[str, ...]:
         """Sentences on what is above the blocks' rate."""
         sentences = [
-            f"{self.name} has a tone of {line.frequency:.4g} Hz with an amplitude of {line.amplitude:.2g}, above the "
-            "blocks' rate: it is averaged out."
+            f"{self.name} has a tone at {line.frequency:.4g} Hz with an amplitude of {line.amplitude:.2g}, above the "
+            "block rate: averaging removes it."
             for line in self.tones
         ]
         if self.spikes:
-            sentences.append(f"{self.name} has {self.spikes} spikes of single samples, which are left out.")
+            sentences.append(f"{self.name} has {self.spikes} spikes of single samples, which are omitted.")
         off = abs(self.sigma / self.declared - 1.0)
         if off > max(0.1, 5.0 * self.sigma_error):
             sentences.append(
-                f"{self.name} has noise of {self.sigma:.2g} per sample above {self.block_rate:.3g} Hz, declared "
-                f"{self.declared:.2g}."
+                f"{self.name} has noise of {self.sigma:.2g} per sample above {self.block_rate:.3g} Hz; the "
+                f"declared value is {self.declared:.2g}."
             )
         if abs(self.slope) > stats.norm.isf(LEVEL):
             kind = "falls" if self.slope > 0.0 else "rises"

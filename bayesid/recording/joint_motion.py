@@ -124,16 +124,16 @@ class MeasuredMotion:
         ----------
         sigma : mapping, optional
             Standard deviation of the noise of position (0), velocity (1) and acceleration (2), for all joints or by
-            joint. Those left out are estimated from the data.
+            joint. Omitted values are estimated from the data.
         start : mapping of str to float, optional
             Positions at time 0 of joints that are recorded by speed only, by default zero.
         blocks_per_second : float, optional
-            Rate above which samples are averaged over blocks [1/s]; 0 keeps every sample.
+            Rate above which samples are averaged over blocks [1/s]; 0 disables averaging.
 
         Raises
         ------
         InputError
-            If a joint of the robot is not recorded, or the recording holds a joint that the robot lacks.
+            If a joint of the robot is not recorded, or the recording contains a joint that the robot lacks.
         """
         check_joints(recording, robot)
         names = tuple(joint.name for joint in robot.joints)
@@ -150,7 +150,7 @@ class MeasuredMotion:
     def check_extent(self, end: float, file: Path | str) -> None:
         """Refuse a recording whose joints are not sampled from about time 0 to about the last of its sensors' samples.
 
-        A smoothing spline says nothing far beyond its samples, except where they are constant.
+        A smoothing spline has no meaning far beyond its samples, unless they are constant.
 
         Parameters
         ----------
@@ -163,15 +163,15 @@ class MeasuredMotion:
             first, last, margin = joint.nodes[0], joint.nodes[-1], EXTENDED * joint.scale
             if not joint.is_constant and (first > margin or end > last + margin):
                 raise InputError(
-                    f"its samples are from {first:g} s to {last:g} s, and its motion is needed from 0 s to {end:g} s",
+                    f"its samples cover {first:g} s to {last:g} s, but its motion is needed from 0 s to {end:g} s",
                     file=file,
                     place=f"joint '{name}'",
-                    remedy="Record the joint all that time, or leave out what sensors read beyond; 0 is the start of "
-                    "the recording",
+                    remedy="Record the joint over this whole period, or omit sensor readings outside it; 0 is the "
+                    "start of the recording",
                 )
 
     def with_noise(self, factor: float) -> MeasuredMotion:
-        """Return the motion smoothed anew with the declared noise of the encoders times a factor."""
+        """Return the motion smoothed again with the declared noise of the encoders times a factor."""
         return replace(self, joints=tuple(joint.with_noise(factor) for joint in self.joints))
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
@@ -218,12 +218,12 @@ def check_joints(recording: Recording, robot: Robot) -> None:
     if missing or strangers:
         parts = []
         if missing:
-            parts.append(f"no position or velocity of joint {', '.join(missing)}")
+            parts.append(f"no position or velocity for joint {', '.join(missing)}")
         if strangers:
-            parts.append(f"joint {', '.join(strangers)} is not one of the robot's")
+            parts.append(f"joint {', '.join(strangers)} is not a joint of the robot")
         remedy = f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path"
         if spun := [name for name in missing if name in recording.wheels]:
-            remedy = f"A wheel of [[robot.wheels]] is no joint: make {', '.join(spun)} fixed in the URDF"
+            remedy = f"A wheel of [[robot.wheels]] is not a joint: make {', '.join(spun)} fixed in the URDF"
         raise InputError("; ".join(parts), file=recording.file or recording.name, remedy=remedy)
 
 

@@ -49,7 +49,7 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
         if readings.size:
             speed = float(np.median(np.abs(readings)))  # single readings may be garbled
             if speed > FASTEST_BASE:
-                problem = f"half of the readings are beyond {speed:.3g} rad/s, which is over three turns a second"
+                problem = f"half of the readings exceed {speed:.3g} rad/s, more than three turns per second"
                 remedy = "Give rates in rad/s, not in arcseconds or degrees per second"
                 units = [u for u, f in UNITS["rate"].items() if f * speed < FASTEST_BASE and u in ("deg/s", "arcsec/s")]
                 conventions = [
@@ -94,8 +94,8 @@ def unwrapped(recording: Recording, robot: Robot) -> Recording:
             continue
         if joint.kind != "continuous":
             raise InputError(
-                f"the angle jumps by a turn at time {time[int(np.argmax(jumps)) + 1]:g} s, as a reading does that "
-                f"begins anew ({int(jumps.sum())} such jumps)",
+                f"the angle jumps by a full turn at time {time[int(np.argmax(jumps)) + 1]:g} s, like a wrapped "
+                f"reading ({int(jumps.sum())} such jumps)",
                 file=recording.file or recording.name,
                 place=f"column {name}",
                 remedy="Unwrap it (numpy.unwrap), or make the joint continuous in the URDF if it has no stops",
@@ -138,7 +138,7 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
             filled = len(set(position[outside].tolist())) == 1 and runs >= OFTEN
             garbled = filled or count <= GARBLED * len(outside)
             conventions = _fill(name, position[outside]) if garbled else _other_conventions(recording, robot, joint)
-            remedy = f"{count} of {len(outside)} samples are garbled: empty their cells" if garbled else other
+            remedy = f"{count} of {len(outside)} samples are corrupted: empty their cells" if garbled else other
             raise ConventionError(
                 conventions,
                 f"{position[row]:g} {joint.unit} at time {time[row]:g} s is outside the joint's limits "
@@ -149,7 +149,7 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
             )
         if fast := _impossible_speed(time, position, joint.velocity):
             raise InputError(
-                f"the joint moves at {fast[1]:.3g} {joint.unit}/s at time {fast[0]:g} s, "
+                f"the joint moves at {fast[1]:.3g} {joint.unit}/s at time {fast[0]:g} s; "
                 f"its limit is {joint.velocity:g}",
                 file=file,
                 place=f"column {name}",
@@ -166,7 +166,7 @@ def _fill(name: str, outside: Floats) -> list[Convention]:
     if len(set(outside.tolist())) > 1:
         return []
     line = f"[sensors.encoder]\nmissing = {outside[0]:.12g}"
-    text = f"{len(outside)} samples of {name} are filled with {outside[0]:g}."
+    text = f"{len(outside)} samples of {name} contain the fill value {outside[0]:g}."
     return [Convention(f"convention:fill:{name}", name, line, text)]
 
 
@@ -183,7 +183,7 @@ def _other_conventions(recording: Recording, robot: Robot, joint: Joint) -> list
         )
 
     position, conventions = seen(joint), []
-    text = f"Joint {joint.name} counts the other way than in the robot's file."
+    text = f"Joint {joint.name} has the opposite sign to that in the robot's file."
     if within(-position):
         conventions.append(Convention(f"convention:sign:{joint.name}", joint.name, f"{quoted}\nsign = -1", text))
     for other in robot.joints:
@@ -202,7 +202,7 @@ def _other_conventions(recording: Recording, robot: Robot, joint: Joint) -> list
             units = ["deg"]
         elif largest > TURN and all((seen(other) % 1.0 == 0.0).all() for other in turns):
             units = []
-            text = "The joints are in counts: give 6.28319 over the counts of a turn."
+            text = "The joints are in counts: scale is 6.28319 divided by the counts per turn."
             line = f"[sensors.encoder]\nscale = {TURN / _counts_of_turn(largest):.6g}"
             conventions.append(Convention("convention:unit:position", "position", line, text))
         for unit in units if largest > TURN else ():

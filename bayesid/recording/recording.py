@@ -46,7 +46,7 @@ class Recording(ShortForm):
     Parameters
     ----------
     name : str
-        Name in reports, which is the stem of the file where there is one.
+        Name in reports; the stem of the file, if there is one.
     file : Path or None
         File that was read, None for a recording made of arrays.
     time : (T,) array_like
@@ -60,7 +60,7 @@ class Recording(ShortForm):
     Raises
     ------
     InputError
-        If a rule of the file format is broken; the message names the file, the column, the line and the value.
+        If a rule of the file format is violated; the message names the file, the column, the line and the value.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Recording(ShortForm):
         return cls(file.stem, file, columns.pop("time"), columns, recorded_as or RecordedAs())
 
     def converted(self, recorded_as: RecordedAs) -> Recording:
-        """Return the recording as the format has it, where it was recorded by other conventions."""
+        """Return the recording in the conventions of the format, if it was recorded with other conventions."""
         columns = recorded_as.converted({"time": self.time, **self.channels})
         return Recording(self.name, self.file, columns.pop("time"), columns, self.recorded_as)
 
@@ -204,7 +204,7 @@ class Recording(ShortForm):
         if partial.any():
             row = int(np.argmax(partial))
             absent = [name for name, gone in zip(names, missing[row], strict=True) if gone]
-            problem = f"the sample is incomplete: {', '.join(absent)} empty, the other axes not"
+            problem = f"the sample is incomplete: {', '.join(absent)} empty, but the other axes are not"
             raise self._error(problem, columns=names, row=row, remedy="Fill or empty all axes of a sample")
         present = ~missing.all(axis=1)
         return self.time[present], values[present]
@@ -219,7 +219,7 @@ class Recording(ShortForm):
         if self.time.ndim != 1 or len(self.time) < MINIMUM_ROWS:
             rows = f"{len(self.time)} rows" if self.time.ndim == 1 else f"time of shape {self.time.shape}"
             problem = f"{rows}; at least {MINIMUM_ROWS} rows are needed"
-            raise InputError(problem, file=self.file or self.name, remedy="Record for longer or more often")
+            raise InputError(problem, file=self.file or self.name, remedy="Record for longer or at a higher rate")
         for column, values in self.channels.items():
             if values.shape != self.time.shape:
                 raise self._error(
@@ -244,13 +244,13 @@ class Recording(ShortForm):
             row = int(np.argmax(falls)) + 1
             fault = "repeats" if time[row] == time[row - 1] else "is earlier than"
             problem = f"time {time[row]:.12g} s {fault} {time[row - 1]:.12g} s of {_row(self.file, row - 1)}"
-            remedy = "Time must strictly increase; sort the rows and join those with the same time"
+            remedy = "Time must strictly increase; sort the rows and merge those with the same time"
             raise self._error(problem, columns=column, row=row, remedy=remedy)
         refuse_other_units(time, self.file or self.name)
         # such a clock was hardly reset: nothing is known of the motion between 0 and the first row
         if time[0] > time[-1] - time[0]:
             raise self._error(
-                f"the first time, {time[0]:.12g} s, is later than the recording is long ({time[-1] - time[0]:.6g} s)",
+                f"the first time, {time[0]:.12g} s, exceeds the length of the recording ({time[-1] - time[0]:.6g} s)",
                 columns=column,
                 row=0,
                 remedy="0 is the start of the recording; subtract the first time",
@@ -277,7 +277,7 @@ class Recording(ShortForm):
             raise self._error(
                 "the wheels are recorded twice, by their speeds and by their momentum",
                 columns=["wheel_momentum.x", f"{WHEEL_SPEED}.{self.wheels[0]}"],
-                remedy="Keep the speeds, and describe each wheel under [[robot.wheels]], or keep the momentum alone",
+                remedy="Use the speeds and describe each wheel under [[robot.wheels]], or use the momentum only",
             )
         for family, axes in VECTOR_FAMILIES.items():
             columns = [f"{family}.{axis}" for axis in axes]
@@ -302,7 +302,7 @@ class Recording(ShortForm):
             row = int(np.argmax(off))
             if len(set(sample := [float(channels[column][row]) for column in columns])) == 1:
                 line = f"[sensors.attitude]\nmissing = {sample[0]:g}"
-                text = f"Attitudes that are missing are filled with {sample[0]:g}."
+                text = f"Missing attitudes contain the fill value {sample[0]:g}."
                 convention = Convention("convention:fill:attitude", "attitude", line, text)
                 raise ConventionError([convention], file=self.file or self.name, place=f"column '{columns[0]}'")
             problem = f"the quaternion's norm is {norm[row]:.6g}, not 1"
@@ -312,10 +312,10 @@ class Recording(ShortForm):
 
 
 _FORMATS = "Use .csv or .parquet"
-_NO_SAMPLE = "Leave the cell empty where there is no sample"
-_DECIMAL = "Write numbers with a decimal point, and leave the cell empty where there is no sample"
+_NO_SAMPLE = "Use an empty cell where there is no sample"
+_DECIMAL = "Write numbers with a decimal point, and use an empty cell where there is no sample"
 _TIMES = "Give times as numbers, in seconds from 0, or as calendar times like 2030-05-01T12:00:00.250Z"
-_ONE_HEADER = "Begin with the samples in the second line: a row of units or a second header is not read"
+_ONE_HEADER = "Start the samples in the second line: a row of units or a second header is not supported"
 
 
 def _locked(values: ArrayLike) -> Array:
@@ -443,7 +443,7 @@ def _read_parquet(file: Path) -> dict[str, Array]:
         with pq.ParquetFile(file) as source:
             table = source.read()
     except (pa.ArrowException, OSError) as error:
-        raise InputError(f"not a Parquet file: {error}", file=file, remedy="Write it anew") from error
+        raise InputError(f"not a Parquet file: {error}", file=file, remedy="Write the file again") from error
     _check_names(table.column_names, file)
     _check_rows(table.num_rows, file)
     columns = dict(zip(table.column_names, table.columns, strict=True))
@@ -556,5 +556,5 @@ def declare_family(name: str, axes: tuple[str, ...]) -> None:
         If the name is taken by columns with other axes.
     """
     if name in (*JOINT_FAMILIES, WHEEL_SPEED) or _VECTOR_FAMILIES.get(name, axes) != axes:
-        raise InputError(f"columns {name!r} exist with another meaning", remedy="Give the sensor another name")
+        raise InputError(f"columns {name!r} already exist with another meaning", remedy="Give the sensor another name")
     _VECTOR_FAMILIES[name] = axes

@@ -88,7 +88,7 @@ class StampedTopic:
         if len(frames) > 1:
             raise self.error(
                 f"its headers name several frames: {', '.join(map(repr, frames))}",
-                remedy="Record each sensor on a topic of its own",
+                remedy="Record each sensor on a separate topic",
             )
         return str(frames[0])
 
@@ -145,10 +145,10 @@ class StampedTopic:
         if bad.sum() > share * counted.sum():
             row = int(np.argmax(bad))
             raise self.error(
-                f"{faults[row]} ({bad.sum()} faulty messages of {counted.sum()}, {share:.3g} of them may be)",
+                f"{faults[row]} ({bad.sum()} of {counted.sum()} messages are faulty; allowed fraction {share:.3g})",
                 message=row,
                 remedy="Record the topic without such messages, choose another part of the bag by --start and --end, "
-                "or leave more of them out by --most-faulty",
+                "or omit more of them with --most-faulty",
             )
         rows = np.flatnonzero(counted & ~bad)
         rows = rows[np.argsort(stamps[rows], kind="stable")]
@@ -183,7 +183,7 @@ def _trusted_stamps(stamps: Integers) -> tuple[Integers, list[str | None]]:
     apart = np.abs(stamps - near)
     for row in np.flatnonzero((apart > FAR) & (stamps > 0)):
         relation = "earlier" if stamps[row] < near[row] else "later"
-        faults[row] = f"its stamp is {apart[row] / 1e9:.6g} s {relation} than those around it"
+        faults[row] = f"its stamp is {apart[row] / 1e9:.6g} s {relation} than the stamps around it"
     return np.where([text is None for text in faults], stamps, near), faults
 
 
@@ -207,9 +207,9 @@ def read_topics(bag: Path, types: Mapping[str, Sequence[str]]) -> dict[str, Stam
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(
-            "bags are read by the library rosbags, which is not installed",
+            "reading bags requires the library rosbags, which is not installed",
             file=bag,
-            remedy="Install bayesid with its extra `ros`, such as by pip install -e '.[ros]'",
+            remedy="Install bayesid with the extra `ros`, for example with pip install -e '.[ros]'",
         ) from None
     if not bag.exists():
         raise InputError("there is no such bag", file=bag, remedy="Give the file .bag of ROS 1 or the folder of ROS 2")

@@ -12,7 +12,7 @@ from enum import Enum
 
 import numpy as np
 
-from bayesid._math.arrays import Floats, Integers
+from bayesid._math.arrays import Bools, Floats, Integers
 from bayesid.recording.convention import Convention
 from bayesid.recording.recording import VECTOR_FAMILIES, Recording
 
@@ -65,15 +65,17 @@ class SuspectReadings:
     def __str__(self) -> str:
         name = self.columns[0] if len(self.columns) == 1 else f"{self.columns[0]} to {self.columns[-1]}"
         if self.kind in (Suspicion.HELD, Suspicion.INTERPOLATED):
-            return (
-                f"{name}: readings are {self.kind.value}, a new one comes every {self.interval:.4g} s: leave the cells "
-                "between empty."
-            )
+            how = "repeated" if self.kind is Suspicion.HELD else "interpolated"
+            return f"{name}: readings are {how} between new values every {self.interval:.4g} s: empty these cells."
         shown = f"{self.value[0]:g}" if len(set(self.value)) == 1 else ", ".join(f"{value:g}" for value in self.value)
         where = f"{self.samples} samples from {self.start:.6g} to {self.end:.6g} s"
         if self.kind is Suspicion.FILLED:
-            return f"{name}: {where} are exactly {shown}, far from the others: empty them if they are fill values."
-        return f"{name}: {where} are exactly {shown}: was it off? Empty their cells or begin the recording later."
+            return (
+                f"{name}: {where} are exactly {shown}, far from the others: empty their cells if they are fill values."
+            )
+        return (
+            f"{name}: {where} are exactly {shown}: was the sensor off? Empty their cells or start the recording later."
+        )
 
     @property
     def convention(self) -> Convention | None:
@@ -164,7 +166,7 @@ def _scattered_fill(values: Floats, steps: Floats) -> tuple[Integers, tuple[floa
     jumps = np.minimum(steps[1:], steps[:-1])
     alone = 1 + np.flatnonzero(jumps > 0.0)
     if values.shape[1] > 1 and len(alone):  # noise never gives one vector again, unless its steps are coarse
-        vectors, counts = np.unique(values, axis=0, return_counts=True)
+        vectors, counts = np.unique(values[_repeated(values[:, 0])], axis=0, return_counts=True)
         again = np.flatnonzero(counts > 1)
         if len(again) == 1 and counts[again[0]] >= AGAIN:
             rows = np.flatnonzero((values == vectors[again[0]]).all(axis=1))
@@ -180,6 +182,12 @@ def _scattered_fill(values: Floats, steps: Floats) -> tuple[Integers, tuple[floa
         return None
     rows = np.flatnonzero((values == samples[most]).all(axis=1))
     return rows, tuple(samples[most].tolist())
+
+
+def _repeated(values: Floats) -> Bools:
+    """Return which of some numbers, (n,), come more than once: far fewer than all, and so cheap to compare."""
+    ordered = np.sort(values)
+    return np.isin(values, ordered[1:][ordered[1:] == ordered[:-1]])
 
 
 def _nearby(steps: Floats, row: int, length: int) -> float:

@@ -92,8 +92,8 @@ def refuse_other_units(time: Floats, file: Path | str) -> None:
         ((name, scale) for name, scale in UNITS.items() if interval / scale[1] < SLOWEST), ("another unit", ("", 1.0))
     )
     raise _in_unit(
-        f"the rows are {interval:g} s apart in the median, too far to follow a motion; in {name} they would be "
-        f"{interval / scale:g} s apart",
+        f"the median interval between rows is {interval:g} s, too long to follow a motion; in {name} it would be "
+        f"{interval / scale:g} s",
         f"Give seconds: divide the times by {scale:g}" if scale > 1.0 else "Give seconds",
         file,
         unit,

@@ -1,4 +1,4 @@
-"""Reports as PDF: a document, its words, its tables and its figures, and one file per report."""
+"""Reports as PDF: the document with its text, tables and figures, and one module per report."""
 
 from bayesid.report.check_report import check_report
 from bayesid.report.design_report import design_report

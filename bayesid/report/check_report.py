@@ -51,12 +51,12 @@ def check_report(
     document.section("Summary")
     document.paragraph(
         f"The study has {counted(len(checks), 'recording')} with {posterior.samples} scalar samples, and "
-        f"{counted(posterior.size, 'unknown')}. The integration step is {posterior.step:g} s. Nothing was identified: "
-        "simulated values are those of the robot as given."
+        f"{counted(posterior.size, 'unknown')}. The integration step is {posterior.step:g} s. No identification was "
+        "run: simulated values are those of the robot as given."
     )
     remarks = [f"{check.name}: {warning}" for check in checks for warning in check.warnings]
     if remarks or not conventions:
-        document.items(remarks or ["Nothing conspicuous."])
+        document.items(remarks or ["No irregularities were detected."])
     if conventions:
         add_conventions(document, conventions)
         document.section("Robot")
@@ -69,22 +69,22 @@ def check_report(
         )
     document.figure(
         figures.plot_robot(robot),
-        "The robot as its file draws it; a link without a shape is a homogeneous box of its mass, centre of mass and "
-        "inertia.",
+        "The robot as described by its file; a link without a shape is drawn as a homogeneous box with the same mass, "
+        "centre of mass and inertia.",
     )
     fits = sensor_fits(posterior, posterior.starting_point())
     drawn = drawn_recordings(checks)
     if len(drawn) < len(checks):
         document.paragraph(
-            f"{counted(len(drawn), 'recording')} are shown in full, those with the most remarks; check.json holds "
-            "the figures of all."
+            f"The {counted(len(drawn), 'recording')} with the most remarks are presented in full; check.json contains "
+            "the values of all recordings."
         )
     for index in drawn:
         check = checks[index]
         _add_recording(document, posterior, index, check)
         document.figure(
             figures.measured_against_simulated(fits[index]),
-            "Readings as measured, and as simulated with the robot as given; beneath, the residual in σ. It is large "
+            "Measured readings, and readings simulated with the robot as given; below, the residual in σ. It is large "
             "until the unknown bodies are identified.",
         )
     document.write(file)
@@ -109,7 +109,7 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
     averaged = [spectrum for spectrum in check.spectra if spectrum.reduced]
     if averaged:
         document.table(
-            ["channel", "samples:", "blocks:", "sigma above the blocks:", "declared:", "tones [Hz]", "spikes:"],
+            ["channel", "samples:", "blocks:", "sigma above the block rate:", "declared:", "tones [Hz]", "spikes:"],
             [
                 [
                     spectrum.name,
@@ -122,16 +122,16 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
                 ]
                 for spectrum in averaged
             ],
-            "Channels that are averaged over blocks before anything is fitted, and what is faster than these.",
+            "Channels that are averaged over blocks before the fit, and their content above the block rate.",
         )
     if check.spectra:
         document.figure(
             figures.channel_spectra(check.spectra),
-            "Amplitude spectral density of each channel, in its unit per root hertz. Where samples are averaged over "
-            "blocks, the line is the blocks' rate; dotted lines are tones above it.",
+            "Amplitude spectral density of each channel, in its unit per root hertz. If samples are averaged over "
+            "blocks, the solid line marks the block rate; dotted lines mark tones above it.",
         )
     document.table(
-        ["sensor", "unit", "declared sigma:", "sigma in quiet stretches:", "delay against the joints [s]:"],
+        ["sensor", "unit", "declared sigma:", "sigma in quiet periods:", "delay relative to the joints [s]:"],
         [
             [
                 sensor.kind.value,
@@ -144,8 +144,8 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             ]
             for sensor in check.sensors
         ],
-        "Noise and clocks. The noise is estimated from third differences where the signal hardly changes; the delay is "
-        "fitted against the robot as given and shifts with its errors.",
+        "Noise and clocks. The noise is estimated from third differences in periods of a nearly constant signal; the "
+        "delay is fitted with the robot as given and depends on its errors.",
     )
     if check.joints:
         document.table(
@@ -170,8 +170,8 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
                 ]
                 for joint in check.joints
             ],
-            "Joint motion after smoothing; the last two columns are the standard deviations that the smoothing leaves "
-            "[joint unit per s, per s²].",
+            "Joint motion after smoothing; the last two columns are the standard deviations after smoothing [joint "
+            "unit per s, per s²].",
         )
         document.figure(figures.plot_manoeuvre(posterior, index), "Motion of the joints.")
 

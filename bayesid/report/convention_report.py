@@ -58,7 +58,7 @@ def convention_report(conventions: Sequence[Convention], title: str, file: Path,
     document = Document(title, "Diagnosis")
     document.foot(origin)
     add_conventions(document, conventions)
-    document.paragraph("Causes in the simulation are not looked for before.")
+    document.paragraph("Causes in the simulation are searched for only after the conventions are correct.")
     document.write(file)
 
 
@@ -72,8 +72,8 @@ def add_conventions(document: Document, conventions: Sequence[Convention]) -> No
     """
     document.section("Wrong conventions")
     document.paragraph(
-        "The recordings contradict what the study says of them, and follow the simulation once it is put right. The "
-        "lines of the table put the study right; bayesid init --fix writes them."
+        "The recordings contradict their description in the study, and agree with the simulation once it is "
+        "corrected. The lines in the table correct the study; bayesid init --fix writes them."
     )
     # with a minus sign in place of the hyphen, after which a line may end
     document.items([convention.text.replace(" -", " \N{MINUS SIGN}") for convention in conventions])
@@ -83,6 +83,6 @@ def add_conventions(document: Document, conventions: Sequence[Convention]) -> No
             [convention.name, format_probability(convention.probability), in_one_line(convention.remedy)]
             for convention in conventions
         ],
-        "Wrong conventions with their remedies. Probabilities weigh them by the balance of momentum against each other "
-        "and against something generic that explains nothing in particular.",
+        "Wrong conventions and their remedies. The probabilities compare them, by the balance of momentum, with each "
+        "other and with a generic alternative that explains nothing in particular.",
     )

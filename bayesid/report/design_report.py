@@ -74,10 +74,10 @@ def _add_result(document: Document, designs: Sequence[Design], best: Design) -> 
             "go",
         ],
         design_rows(designs),
-        "Manoeuvres, named after the criterion each was designed by. Logarithm of the determinant of the predicted "
-        "posterior covariance of all parameters in SI units; geometric mean of their standard deviations (sd) relative "
-        f"to {reference.name}; sd of the log-Cholesky coordinates along the worst direction (relative: a mass is known "
-        "to twice it); evaluations of the search; whether all limits hold with 99 % probability.",
+        "Manoeuvres, named after their design criterion. Logarithm of the determinant of the predicted posterior "
+        "covariance of all parameters in SI units; geometric mean of their standard deviations (sd) relative to "
+        f"{reference.name}; sd of the log-Cholesky coordinates along the worst direction (the relative sd of a mass is "
+        "twice as large); evaluations of the search; whether all limits are satisfied with 99 % probability.",
     )
     document.table(
         ["quantity", "unit", "prior centre:", *(f"{design.name}:" for design in designs)],
@@ -91,16 +91,16 @@ def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> 
     document.table(
         ["quantity", "unit", "limit:", "largest:", "used:", "state"],
         limit_rows(best),
-        f"Limits of {best.name} and the largest value along it, at the prior's centre. A joint's range is counted from "
-        "its middle; rest is the joints' speed at both ends; the value of a quiet band is the share of the power of "
-        "the base's motion within it.",
+        f"Limits of {best.name} and the largest value along it, at the prior's centre. The range of a joint is "
+        "measured from its midpoint; rest is the speed of the joints at both ends; the value of a quiet band is the "
+        "share of the power of the base motion within it.",
     )
     if rows := risk_rows(designs):
         document.table(
-            ["manoeuvre", "quantity", "unit", "limit:", "99 % below:", "go"],
+            ["manoeuvre", "quantity", "unit", "limit:", "99 % quantile:", "go"],
             rows,
-            "Limits that depend on the inertial parameters, under the present uncertainty: the value that the largest "
-            "along the manoeuvre stays below with 99 % probability.",
+            "Limits that depend on the inertial parameters, under the present uncertainty: the value below which the "
+            "maximum along the manoeuvre lies with 99 % probability.",
         )
 
 
@@ -111,22 +111,22 @@ def _add_manoeuvres(document: Document, designs: Sequence[Design], best: Design)
     robot, duration = best.problem.plan.model.robot, best.problem.plan.family.duration
     document.figure(
         figures.robot_pose(robot, best.motion, np.linspace(0.0, duration, POSES + 1)[:-1]),
-        f"The robot as given along {best.name}, in the base frame. Sticks join the joints; the last ones end at the "
+        f"The robot as given along {best.name}, in the base frame. Lines connect the joints; the last ones end at the "
         "centre of mass of the last body.",
     )
     for design in shown.values():
         document.figure(
             figures.joints_within_limits(design),
-            f"Positions and speeds of the joints along {design.name}; limits are dashed red.",
+            f"Positions and speeds of the joints along {design.name}; limits are dashed red lines.",
         )
     document.figure(
         figures.tip_motion(shown),
-        "Speed and turning rate of the tip, each the larger of those relative to the base and to inertial space.",
+        "Speed and angular rate of the tip, each the larger of the values relative to the base and to inertial space.",
     )
     document.figure(
         figures.base_motion(shown),
-        "Motion of the base, as in the paper's figure 4: angular velocity in base axes; displacement of the base's "
-        "origin and Cardan angles of the base in the axes of the start.",
+        "Motion of the base, as in figure 4 of the paper: angular velocity in base axes; displacement of the base "
+        "origin and Cardan angles of the base relative to the initial axes.",
     )
 
 
@@ -174,7 +174,7 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
     for design in designs:
         ratio = design.predicted.geometric_mean / scale
         size = "" if design is reference else f"standard deviations {ratio:.3g} times those of {reference.name}, and "
-        kept = "every limit is kept" if design.go else "some limit is not kept"
+        kept = "every limit is satisfied" if design.go else "at least one limit is not satisfied"
         lines.append(f"{design.name}: {size}{kept} with 99 % probability under the present uncertainty of the robot.")
     separated = [design for design in designs if design.designed_by is not None and design.designed_by.rivals]
     return [*lines, *map(separation_sentence, separated), f"Best: {best.name}."]
@@ -184,17 +184,17 @@ def separation_sentence(design: Design) -> str:
     """Return how well a manoeuvre that was designed to tell effects apart does so, and down to which size."""
     criterion = design.designed_by
     if criterion is None or not criterion.rivals:
-        raise ValueError(f"{design.name} was not designed to tell effects apart")
+        raise ValueError(f"{design.name} was not designed to separate effects")
     noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
     share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
     unseen = [f"{count} of {label}" for label, count in criterion.unseen.items()]
-    rest = f" Directions of the amplitudes that no manoeuvre shows are left out: {joined(unseen)}." if unseen else ""
+    rest = f" Directions of the amplitudes that no manoeuvre reveals are omitted: {joined(unseen)}." if unseen else ""
     return (
-        f"{design.name} tells {joined(criterion.rivals)} apart: of the size of their priors, the least distinct has a "
-        f"signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of two "
-        f"causes that are equally probable before, the right one is expected to have a probability of "
-        f"{format_number(SURE)} afterwards if its size is {format_percent(share, 2)} of its prior's, and "
-        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if half of that.{rest}"
+        f"{design.name} distinguishes {joined(criterion.rivals)}: at the size of its prior, the least distinct effect "
+        f"has a signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of "
+        f"two causes that are equally probable beforehand, the correct one is expected to reach a probability of "
+        f"{format_number(SURE)} if its size is {format_percent(share, 2)} of its prior's, and "
+        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if its size is half of that.{rest}"
     )
 
 
@@ -209,16 +209,16 @@ def assumption_sentences(best: Design) -> list[str]:
     ]
     return [
         "The search compares manoeuvres by the white noise of the sensors and the noise of the encoders at the "
-        "start; the predicted standard deviations and covariances below take the encoders along the manoeuvre and "
-        "include the filters, and every other unknown is marginalised.",
-        "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
+        "start. The predicted standard deviations and covariances below use the noise of the encoders along the "
+        "manoeuvre and include the filters; every other unknown is marginalised.",
+        "Predictions are valid to first order about the prior's centre (Laplace), and include the prior.",
         f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
         f"simulates every {f'{ordinal(plan.thinning)} ' if plan.thinning > 1 else ''}sample. Limits are evaluated "
         "every half step in the search, and eight times more finely at its end.",
         f"Tip speed and tip rate are those of {plan.tip.name}, each the larger of the one relative to the base and the "
         "one relative to inertial space.",
         "The risk is evaluated over draws from the prior of the bodies with the base starting at rest: the initial "
-        "rate, which the manoeuvre does not cause, is left out.",
+        "rate, which the manoeuvre does not cause, is omitted.",
         *sensors,
         *planning_sentences(plan),
     ]
@@ -226,13 +226,13 @@ def assumption_sentences(best: Design) -> list[str]:
 
 def _verdict(best: Design) -> str:
     if best.go:
-        return "It keeps every limit, with 99 % probability also under the present uncertainty of the robot."
+        return "It satisfies every limit, also with 99 % probability under the present uncertainty of the robot."
     broken = ", ".join(
         f"{risk.name} ({format_number(risk.quantile)} {format_unit(risk.unit)})" for risk in best.risks if not risk.go
     )
     return (
-        "It keeps every limit for the robot as given, but under the present uncertainty not with 99 % probability: "
-        f"{broken}. It is a no go until the robot is known better or the limits leave more room."
+        "It satisfies every limit for the robot as given, but not with 99 % probability under the present uncertainty: "
+        f"{broken}. It is a no go until the robot is known more accurately or the limits are relaxed."
     )
 
 

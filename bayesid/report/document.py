@@ -91,13 +91,13 @@ class Document:
             self._parts.append(f"#list({', '.join(entries)})\n")
 
     def decision(self, title: str, entries: Sequence[tuple[str, str]], picture: Figure | None = None) -> None:
-        """Add a framed box with a title, rows of a name and its text, and a picture in its own size beside them."""
+        """Add a framed box with a title, rows of a name and its text, and a picture next to them in its true size."""
         cells = "".join(f", {literal(text)}" for entry in entries for text in entry)
         image = "none" if picture is None else f"image({self._image(picture)})"
         self._parts.append(f"#decision({literal(title)}, {image}{cells})\n")
 
     def mentions(self, pattern: str) -> bool:
-        """Whether a regular expression occurs in what was added so far, figures aside."""
+        """Whether a regular expression occurs in the content added so far, except in figures."""
         return any(re.search(pattern, part) for part in self._parts[1:])
 
     def foot(self, first: str, last: str = "") -> None:
@@ -105,7 +105,7 @@ class Document:
         self._parts.insert(1, f"#set page(footer: foot({literal(first)}, {literal(last)}))\n")
 
     def page(self) -> None:
-        """Go on at the top of a new page."""
+        """Start a new page."""
         self._parts.append("#pagebreak(weak: true)\n")
 
     def formula(self, typst_math: str) -> None:
@@ -129,7 +129,7 @@ class Document:
             Cells, as many in each row as there are columns.
         caption : str, optional
         align : sequence of str, optional
-            Alignment of each column, ``left``, ``center`` or ``right``, for columns of which the titles do not say it.
+            Alignment of each column, ``left``, ``center`` or ``right``, in place of that by the titles.
         """
         if align is None:
             align = ["right" if title.endswith(":") else "left" for title in header]

@@ -26,25 +26,25 @@ __all__ = ["CatalogueEntry", "catalogue", "entry_of", "example_model"]
 WIDTH = 100  # width of the text in characters
 EXAMPLE = "ets7"  # robot of the package for which sizes are given where there is no study
 
-FAULT_OF_NOISE = "It is sought in the residual, from which its size follows too; a study states it under [model.noise]."
+FAULT_OF_NOISE = "A diagnosis detects it in the residual and estimates its size; a study states it under [model.noise]."
 
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """What the catalogue says of one effect.
+    """Description of one effect in the catalogue.
 
     Attributes
     ----------
     name : str
         Name as in study files, with LINK, JOINT, WHEEL or AXIS where a place follows.
     summary, separated_by : str
-        What the effect is, and what tells it from others.
+        What the effect is, and what distinguishes it from others.
     parameters : tuple of str
         Parameters with units and priors.
     sizes : tuple of str
-        Largest plausible sizes, up to which a diagnosis takes every power of ten as equally probable, with reasons.
+        Largest plausible sizes, with reasons; up to these a diagnosis takes every power of ten as equally probable.
     needs : tuple of str
-        What a study must have for the effect to exist or to show.
+        What a study must contain for the effect to exist or to be visible.
     """
 
     name: str
@@ -138,11 +138,11 @@ def _name(effect: Effect, robot: Robot) -> str:
 def _parameters(effect: Effect) -> tuple[str, ...]:
     """Return the parameters in lines, one for those that share unit and prior."""
     if not effect.parameters:
-        return ("none, its size is physics",)
+        return ("none: physics determines its size",)
     groups = groupby(effect.parameters, key=lambda parameter: parameter[1:])
     lines = [_group(list(group)) for _, group in groups]
     if effect.per_recording:
-        lines.append("all of them anew in every recording")
+        lines.append("with separate values in every recording")
     if [quantity.name for quantity in effect.quantities] != [parameter.name for parameter in effect.parameters]:
         reported = ", ".join(f"{quantity.name} [{_unit(quantity.unit)}]" for quantity in effect.quantities)
         lines.append(f"reported as {reported}")
@@ -199,7 +199,7 @@ def _needs(kind: type[Effect]) -> tuple[str, ...]:
     """Return the parts of a study without which the effect does not occur, found by taking each away."""
     whole = _example_with(kind)
     if not kind.instances(whole):
-        return ("arguments of its own, since it does not occur in the example by itself",)
+        return ("explicit arguments, since it has no default instance in the example",)
     sensors = {f"[{sensor.kind.section}]": _without(sensor.kind) for sensor in whole.sensors}
     taken = {**TAKEN_AWAY, **sensors}
     needs = [part for part, take in taken.items() if not kind.instances(take(whole))]
@@ -212,8 +212,8 @@ def _entries_of_noise() -> list[CatalogueEntry]:
     """Return the entries of what a diagnosis names and no effect describes: faults of noise, a turning start."""
     start = CatalogueEntry(
         name="initial-rate",
-        summary="The base was already turning when the recording began; the model lets it start from rest.",
-        parameters=("x, y, z [rad/s]: normal, in every recording anew",),
+        summary="The base was already turning when the recording began; the model assumes that it starts from rest.",
+        parameters=("x, y, z [rad/s]: normal, separate in every recording",),
         needs=('initial_rate = "zero" in [model]',),
     )
     faults = {fault.entry: fault for fault in noise_faults().values()}

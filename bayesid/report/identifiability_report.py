@@ -79,20 +79,20 @@ def _add_directions(document: Document, result: Practical) -> None:
     document.section("Directions")
     document.figure(
         figures.direction_widths(result.directions),
-        "Share of the prior's width that is left in every direction, from the worst known to the best. At one the data "
-        "said nothing.",
+        "Remaining share of the prior's width in every direction, from the worst to the best known. At one, the data "
+        "add no information.",
     )
     shown = min(SHOWN, len(result.directions))
     document.table(
-        ["no.:", "left:", "verdict", "direction"],
+        ["no.:", "remaining:", "verdict", "direction"],
         direction_rows(result, shown),
-        f"The {shown} worst known of {len(result.directions)} directions: the share of the prior's width that is left, "
+        f"The {shown} worst known of {len(result.directions)} directions: the remaining share of the prior's width, "
         "and the largest parts of the displacement that the data cannot resolve.",
     )
     document.figure(
         figures.displacements(result.directions, result.knowledge.prior_sd),
         "Displacement of the parameters along the worst known directions by one posterior sd, in units of the "
-        "parameter's prior sd. Parameters that none of these moves are left out.",
+        "parameter's prior sd. Parameters that no direction moves are omitted.",
     )
 
 
@@ -106,9 +106,9 @@ def _add_parameters(document: Document, result: Practical) -> None:
         [header[column] for column in kept],
         [[row[column] for column in kept] for row in rows],
         "Parameters of the bodies to identify, in the axes of the link, inertias about the body's centre of mass: "
-        "value and sd of the normal approximation, prior sd, and learnt, which is one minus sd over prior sd; if there "
-        "are any, parameters with which the correlation is above 0.9 in size, and the profile interval where the "
-        "posterior is not normal.",
+        "value and sd of the normal approximation, prior sd, and learnt, which is one minus sd over prior sd; where "
+        "applicable, parameters with a correlation above 0.9 in magnitude, and the profile interval of a posterior "
+        "that is not normal.",
     )
 
 
@@ -120,28 +120,29 @@ def _add_advice(document: Document, result: Practical) -> None:
     document.table(
         ["with", *numbers, f"sd of {worst.name}:", "nats:"],
         advice_rows(result, worst),
-        "Candidates to add to the study, each alone, pulses and swings to every recording: the share of the prior's "
-        "width that each would leave in the presently worst directions, the standard deviation it would give to the "
-        "presently worst known parameter, and the information on all parameters that it would add.",
+        "Possible additions to the study, each alone; pulses and swings are added to every recording. For each: the "
+        "remaining share of the prior's width in the presently worst directions, the standard deviation of the "
+        "presently worst known parameter, and the added information on all parameters.",
     )
 
 
 def _add_structure(document: Document, structure: BaseParameters) -> None:
     document.section("Structure of the robot")
     document.paragraph(
-        "This section holds for any motion and any sensors, and for known torques or actions. The standard parameters "
-        "of a body are its mass, the first moment of mass (first.x, y, z) and the inertia about the origin of the "
-        "link, in the link's axes. Not all can be told apart: the dependent ones act only in sums with others."
+        "This section is valid for any motion and any sensors, and for known torques or actions. The standard "
+        "parameters of a body are its mass, the first moment of mass (first.x, y, z) and the inertia about the origin "
+        "of the link, in the link's axes. Not all of them can be separated: the dependent ones act only in sums with "
+        "others."
     )
     rows, alone = regrouping_rows(structure)
     document.table(
         ["base parameter", "regrouped with dependent parameters"],
         rows,
-        f"Base parameters that stand for sums. Coefficients follow from the geometry [m, m²]; the "
+        f"Base parameters that represent sums. Coefficients follow from the geometry [m, m²]; the "
         f"{len(structure.dependent)} dependent parameters are {', '.join(structure.dependent)}.",
     )
     if alone:
-        document.paragraph(f"These stand for themselves: {', '.join(alone)}.")
+        document.paragraph(f"The other base parameters are single parameters: {', '.join(alone)}.")
 
 
 def structure_sentence(structure: BaseParameters) -> str:
@@ -158,10 +159,11 @@ def practical_sentences(result: Practical) -> list[str]:
     total = len(result.parameters)
     fully, weakly, not_at_all = (count[verdict] for verdict in ContractionVerdict)
     sentences = [
-        f"Of {total} parameters of the bodies to identify {fully} are learnt, {weakly} weakly, {not_at_all} not."
+        f"Of {total} parameters of the bodies to identify, {fully} are learnt, {weakly} weakly learnt and {not_at_all} "
+        "not learnt."
     ]
     if names := [item.name for item in result.parameters if item.verdict is ContractionVerdict.NOT]:
-        sentences.append(f"Not learnt, so that the posterior is the prior: {abridged(names)}.")
+        sentences.append(f"Not learnt (the posterior equals the prior): {abridged(names)}.")
     directions = sum(item.verdict is ContractionVerdict.NOT for item in result.directions)
     if directions:
         plural = "direction is" if directions == 1 else "directions are"
@@ -169,7 +171,7 @@ def practical_sentences(result: Practical) -> list[str]:
     sentences.append(f"The worst known direction: {result.words[0]}.")
     worst = min(result.parameters, key=lambda item: item.shrinkage)
     sentences.append(
-        f"The worst known parameter: {worst.name}, {format_percent(1.0 - worst.shrinkage)} of the prior's width is left"
+        f"The worst known parameter: {worst.name}, {format_percent(1.0 - worst.shrinkage)} of the prior's width remains"
         f"{_confused(worst)}."
     )
     return sentences
@@ -184,30 +186,31 @@ def advice_sentences(result: Practical) -> list[str]:
         return ["None of the candidates narrows the worst direction by more than 5 %."]
     best = [item for item in usable if item.directions[0] <= 0.95 * now][:WORST]
     texts = "; ".join(f"{format_percent(item.directions[0])} with {item.text}" for item in best)
-    return [f"Of the worst direction {format_percent(now)} of the prior's width is left. It would be {texts}."]
+    return [f"In the worst direction, {format_percent(now)} of the prior's width remains. It would be {texts}."]
 
 
 def confidence_sentences(result: Practical) -> list[str]:
     """Return how the normal approximation was checked."""
     draws = result.draws
     if not draws.trusted:
-        also = "with so many unknowns emcee was not tried"
+        also = "emcee was not tried because of the number of unknowns"
         if draws.method is Method.ENSEMBLE:
             also = "emcee has not converged"
         return [
-            f"Whether the posterior is normal is not evaluated: importance sampling may not be trusted (Pareto k-hat "
+            f"The normality of the posterior is not evaluated: importance sampling is not reliable (Pareto k-hat "
             f"{draws.pareto_k:.2f}), and {also}. All widths are those of the normal approximation; profile intervals "
-            "are given for the worst known parameters of which something was learnt."
+            "are given for the worst known of the learnt parameters."
         ]
     skewed = [item.name for item in result.parameters if not item.normal]
     how = f"{draws.method.value}, {len(draws.values)} draws, Pareto k-hat of importance sampling {draws.pareto_k:.2f}"
     if not skewed:
         return [
-            f"The posterior of every parameter is normal within {NORMAL:g} sd at its 2.5, 16, 84 and 97.5 % ({how})."
+            f"The posterior of every parameter is normal within {NORMAL:g} sd at its 2.5, 16, 84 and 97.5 % quantiles "
+            f"({how})."
         ]
     profiled = sum(item.profile is not None for item in result.parameters)
     return [
-        f"The posterior of {abridged(skewed)} is not normal: a quantile is off by more than {NORMAL:g} sd ({how}). "
+        f"The posterior of {abridged(skewed)} is not normal: a quantile deviates by more than {NORMAL:g} sd ({how}). "
         f"{profiled} of {len(skewed)} were profiled, the least normal first."
     ]
 
@@ -217,18 +220,18 @@ def method_sentences(result: Practical) -> list[str]:
     return [
         "Prior and posterior are compared in the normal approximation about the fit (for a prediction, about the "
         "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and D "
-        "that of the parameters. Initial rates, effects and links that are known to a few percent are marginalised.",
+        "that of the parameters. Initial rates, effects and links with a few percent uncertainty are marginalised.",
         f"A parameter or direction is learnt if the data narrow the prior by at least {100 * CONTRACTED:.0f} %, and "
-        f"not learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
-        "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
-        "all of these together say.",
+        f"not learnt if they narrow it by less than {100 * PRIOR_ONLY:.0f} %.",
+        "Learning includes information that the data transfer from other parameters: a mass that the data tie to "
+        "others is known as well as the priors of all of these together allow.",
         "A direction is a combination of parameters whose weights are scaled so that the largest, times the prior sd "
         "of its parameter, is one. Its displacement is the change of all parameters by one posterior sd of the "
-        "combination: the data cannot tell whether it happened. Directions of which the data tell less than 1 % have "
-        "no order; they are turned so that each moves few parameters.",
-        "The words for a direction are read off its displacement in units of the prior's widths and name only its "
-        "largest parts; the numbers are in identifiability.json.",
-        "Advice is computed as one more prediction for each candidate, linearised at the same point.",
+        "combination, which the data cannot resolve. Directions in which the data narrow the prior by less than 1 % "
+        "have no order; they are rotated so that each moves few parameters.",
+        "The description of a direction is derived from its displacement in units of the prior's widths and names only "
+        "its largest parts; the numbers are in identifiability.json.",
+        "The recommendations use one additional prediction for each candidate, linearised at the same point.",
     ]
 
 
@@ -238,7 +241,7 @@ def _confused(item: ParameterRow) -> str:
     alone = 1.0 - item.conditional_sd / item.prior_sd
     names = abridged([name for name, _ in item.correlated_with])
     if np.isfinite(alone) and alone > item.shrinkage + PRIOR_ONLY:
-        return f", as it is confused with {names}; were these known, {format_percent(1.0 - alone)} would be"
+        return f" because it is confused with {names}; if these were known, {format_percent(1.0 - alone)} would remain"
     return f"; it is correlated with {names}"
 
 
@@ -291,7 +294,7 @@ def advice_rows(result: Practical, worst: ParameterRow) -> Rows:
     """
     now = [item.sd / item.prior_sd for item in result.directions[:WORST]]
     return [
-        ["nothing more (now)", *_shares(now), f"{format_number(worst.sd, 2)} {format_unit(worst.unit)}", "0.0"],
+        ["no addition (present)", *_shares(now), f"{format_number(worst.sd, 2)} {format_unit(worst.unit)}", "0.0"],
         *(_advice_row(item, worst.unit) for item in result.advice),
     ]
 

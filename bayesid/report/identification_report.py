@@ -82,7 +82,7 @@ def _add_result(document: Document, result: Identification) -> None:
             ["quantity", "unit", "prior centre:", "posterior mean ± sd:", "sd / |mean|:", "learnt:"],
             rows,
             "Identified bodies, in the axes of the link; inertias are about the body's centre of mass. Learnt is the "
-            "share by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
+            "share by which the data narrowed the prior (half the central 68 %); prior only means less than 10 %.",
         )
     if rows := effect_rows(result):
         header = ["parameter", "unit", "prior, central 68 %:", "posterior mean ± sd:", "|mean| / sd:"]
@@ -99,15 +99,15 @@ def _add_robot(document: Document, result: Identification) -> None:
     robot = result.posterior.model.robot
     joints = ", ".join(f"{joint.name} ({joint.kind})" for joint in robot.joints) or "none"
     document.paragraph(
-        f"The robot {robot.name} stands on the base {robot.base}. Moving joints: {joints}. With all links it has a "
-        f"mass of {robot.mass:.6g} kg as given, before the identification."
+        f"The base of the robot {robot.name} is {robot.base}. Moving joints: {joints}. The mass of all links together "
+        f"is {robot.mass:.6g} kg as given, before the identification."
     )
     for number, manoeuvre in enumerate(result.posterior.manoeuvres):
         motion, time, name = manoeuvre.motion, manoeuvre.recording.time, manoeuvre.recording.name
         if number == 0:
             document.figure(
                 figures.robot_pose(robot, motion, np.linspace(time[0], time[-1], POSES + 1)[:-1]),
-                f"The robot as given, during {name}, in the base frame. Sticks join the joints; the last ones end at "
+                f"The robot as given, during {name}, in the base frame. Lines connect the joints; the last ones end at "
                 "the centre of mass of the last body.",
             )
         if robot.joints:
@@ -118,24 +118,24 @@ def _add_fit(document: Document, result: Identification) -> None:
     document.section("Measured against simulated")
     document.paragraph(
         "Residuals are in units of their noise σ: that of the sensor and, through the dynamics, that of the encoders. "
-        "They are taken at the mode and freed of their correlation, so that a right model leaves independent values "
-        "of standard deviation one; the grey band is ± 2 σ."
+        "They are evaluated at the mode and decorrelated, so that a correct model gives independent values with a "
+        "standard deviation of one; the grey band is ± 2 σ."
     )
     document.table(
         ["recording", "sensor", "samples:", "chi-square per sample:", "largest residual:"],
         misfit_rows(result),
-        "Misfit by recording and sensor. Noise alone gives one, in two cases of three within the ± stated.",
+        "Misfit by recording and sensor. Noise alone gives one, within the stated ± in two of three cases.",
     )
     for manoeuvre, sensors in zip(result.posterior.manoeuvres, result.sensor_fits, strict=True):
         document.figure(
             figures.measured_against_simulated(sensors),
-            f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
+            f"Measured and simulated readings of {manoeuvre.recording.name}, sensor axes; below, the residual in σ.",
         )
     _add_torques(document, result)
     document.figure(
         figures.residual_statistics(ResidualView.at(result.posterior, result.optimum.z)),
-        "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
-        "the standard normal one.",
+        "Residuals of all recordings. Left: mean power by frequency; noise alone gives one. Right: distribution, with "
+        "the standard normal distribution.",
     )
 
 
@@ -145,8 +145,8 @@ def _add_torques(document: Document, result: Identification) -> None:
     document.table(
         ["recording", "joint", "noise per sample:", "samples used:", "chi-square per sample:", "largest residual:"],
         torque_rows(result),
-        "Joint torques. The torque of a joint with dry friction that stands nearly still carries no information and is "
-        "left out.",
+        "Joint torques. The torque of a joint with dry friction that is nearly at rest contains no information and is "
+        "omitted.",
     )
     for manoeuvre, joints in zip(result.posterior.manoeuvres, result.torque_fits, strict=True):
         document.figure(
@@ -160,13 +160,13 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
     document.section("Uncertainty")
     document.figure(
         figures.prior_to_posterior(result),
-        "Width of the posterior over that of the prior. At one (10⁰) the data said nothing.",
+        "Width of the posterior relative to that of the prior. At one (10⁰), the data add no information.",
     )
     for name in result.bodies:
         document.figure(
             figures.plot_posterior(result, name),
-            f"Joint posterior of {name}: contours hold 50 % and 90 %. Axes are offsets from the mean in standard "
-            "deviations; mean and standard deviation stand over the diagonal.",
+            f"Joint posterior of {name}: contours contain 50 % and 90 %. Axes are offsets from the mean in standard "
+            "deviations; mean and standard deviation are given above the diagonal.",
         )
     if 0 < len(result.names) <= LARGEST_CORRELATIONS:
         alone = len(result.bodies) == 1
@@ -182,9 +182,9 @@ def _add_computation(document: Document, result: Identification) -> None:
     document.items(agreement_sentences(result))
     document.figure(
         figures.convergence(result),
-        "The coordinates in which the ensembles agree least. Left: mean of the draws so far, about the mean of all, "
-        "in posterior standard deviations. Right: ranks of each ensemble's draws among all, which are spread evenly "
-        "where all sample the same distribution.",
+        "The coordinates in which the ensembles agree least. Left: running mean of the draws, relative to the mean of "
+        "all draws, in posterior standard deviations. Right: ranks of each ensemble's draws among all draws, which are "
+        "uniform if all ensembles sample the same distribution.",
         floating=True,
     )
 
@@ -214,23 +214,23 @@ def verdict(result: Identification) -> str:
     posterior, chi2, deviation = result.posterior, result.optimum.chi2, result.chi2_deviation
     expected, spread = result.expected_chi2
     numbers = (
-        f"Chi-square, the sum of squares of the residuals in units of their noise, is {chi2:.0f}, that is "
+        f"Chi-square, the sum of squares of the residuals in units of their noise, is {chi2:.0f}, or "
         f"{chi2 / posterior.samples:.3f} per sample. With {posterior.samples} samples and {posterior.size} unknowns, "
         f"noise alone gives {expected:.0f} ± {spread:.0f}; the difference is {format_signed(deviation)} standard "
         "deviations. "
     )
     if deviation > LIMIT:
         return numbers + (
-            "The model does not explain the data: they hold more than the declared noise. The uncertainties below "
-            "assume that the model is right, so they are too small, and the values may be shifted by more than "
-            "they say. A diagnosis looks for the cause."
+            "The model does not explain the data: the residuals contain more than the declared noise. The "
+            "uncertainties below assume that the model is correct, so they are too small, and the errors of the values "
+            "may be larger than stated. A diagnosis searches for the cause."
         )
     if deviation < -LIMIT:
         return numbers + (
             "The residuals are smaller than the declared noise: the sensors are better than declared, so the "
             "uncertainties below are too large."
         )
-    return numbers + "The declared noise is enough: by this measure the model explains the data."
+    return numbers + "The declared noise is sufficient: by this measure the model explains the data."
 
 
 def agreement_sentences(result: Identification) -> list[str]:
@@ -246,7 +246,7 @@ def agreement_sentences(result: Identification) -> list[str]:
         f"time {format_number(chains.autocorrelation)} steps; {_converged(chains.converged)}."
     )
     weights = (
-        f"Importance sampling: {evidence.evaluations} draws worth {evidence.effective_samples:.0f}, Pareto k-hat "
+        f"Importance sampling: {evidence.evaluations} draws, {evidence.effective_samples:.0f} effective, Pareto k-hat "
         f"{evidence.pareto_k:.2f} ({'trusted' if evidence.trusted else 'not trusted'}; the limit is 0.7). "
         f"Log evidence {format_quantity(evidence.value, evidence.error)}; the Laplace approximation gives "
         f"{format_number(optimum.log_evidence(result.posterior), 8)}."

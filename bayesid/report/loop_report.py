@@ -16,8 +16,8 @@ from bayesid.simulation.effects import known_effects
 __all__ = ["ending_sentence", "goal_words", "loop_report", "loop_sentences", "next_sentence", "review_words"]
 
 TITLES = {
-    "reached": "All that is wanted is reached",
-    "at-most": "Not reached",
+    "reached": "All goals are reached",
+    "at-most": "Not all goals are reached",
     "no-go": "No go",
     "wrong-model": "The model is wrong",
     "waiting": "Waiting for a recording",
@@ -66,22 +66,24 @@ def loop_report(history: History, title: str, file: Path, *, origin: str = "") -
             "goals reached:",
         ],
         step_rows(history.steps),
-        "Every step: how many designs it took until all limits held with 99 %; the limit that the planned manoeuvre "
-        "comes closest to, and the share of it that the 99 % quantile uses; the misfit of its identification.",
+        "For each step: the number of designs until all limits were satisfied with 99 % probability; the limit that "
+        "the planned manoeuvre approaches most closely, and the share of it that the 99 % quantile uses; the misfit of "
+        "its identification.",
     )
     document.figure(
         figures.loop_progress(done),
-        "Left: standard deviation over mean of each body's mass and moments after each step. Right: 99 % quantile of "
-        "each limited quantity that depends on the inertial parameters, over its limit, of the manoeuvre that was "
-        "flown.",
+        "Left: ratio of standard deviation to mean of each body's mass and moments after each step. Right: ratio of "
+        "the 99 % quantile to the limit, for each limited quantity of the flown manoeuvre that depends on the inertial "
+        "parameters.",
     )
     document.section("Conditions")
     document.items(
         [
-            "Each step's prior is the posterior of the step before, as a normal distribution of log-Cholesky "
-            "coordinates; uncertain links that are not to be identified are carried along.",
-            "A manoeuvre is flown only if every limit holds with 99 % under what is known then.",
-            "All recordings so far are diagnosed together after each step; a loop whose model is excluded stops."
+            "The prior of each step is the posterior of the previous step, as a normal distribution of log-Cholesky "
+            "coordinates; uncertain links that are not to be identified are included.",
+            "A manoeuvre is flown only if every limit is satisfied with 99 % probability under the knowledge at that "
+            "time.",
+            "After each step, all recordings so far are diagnosed together; the loop stops if its model is excluded."
             if "diagnosis" in last
             else "The recordings were not diagnosed: a wrong model would not have been noticed.",
         ]
@@ -95,8 +97,8 @@ def loop_report(history: History, title: str, file: Path, *, origin: str = "") -
     document.table(
         ["step:", "limit", "allowed:", "planned:", "99 % quantile:", "unit"],
         limit_rows(done),
-        "Limits of the manoeuvres that were flown: the largest planned value at the centre of what was known, and "
-        "where it depends on that, the value it stays below with 99 %.",
+        "Limits of the flown manoeuvres: the largest planned value at the centre of the step's prior and, if it "
+        "depends on the prior, the value below which it lies with 99 % probability.",
     )
     document.write(file)
 
@@ -111,7 +113,10 @@ def loop_sentences(history: History) -> Iterator[str]:
     for step in history.steps:
         number, attempts = step["step"], step["plan"]["attempts"]
         if len(attempts) > 1:
-            yield f"Step {number}: designed {counted(len(attempts), 'time')} until all limits held with 99 %."
+            yield (
+                f"Step {number}: designed {counted(len(attempts), 'time')} until all limits were satisfied with 99 % "
+                "probability."
+            )
         for name, body in step.get("identification", {}).get("bodies", {}).items():
             yield f"Step {number}: {name}: mass {format_quantity(body['mass']['mean'], body['mass']['sd'])} kg."
         yield from step.get("identification", {}).get("disagreements", ())
@@ -138,7 +143,7 @@ def goal_words(goal: dict[str, Any]) -> str:
     """Return the value of a goal beside what is wanted."""
     unit = "" if goal["unit"] == "1" else f" {format_unit(goal['unit'])}"
     value, wanted = (f"{format_number(goal[key], 3)}{unit}" for key in ("value", "wanted"))
-    return f"{goal['goal']} {value}, wanted {wanted}: {'reached' if goal['reached'] else 'not reached'}"
+    return f"{goal['goal']} {value}, required {wanted}: {'reached' if goal['reached'] else 'not reached'}"
 
 
 def ending_sentence(history: History) -> str:
@@ -149,16 +154,16 @@ def ending_sentence(history: History) -> str:
         return f"Fly {history.path(number, 'plan')}: positions, velocities and accelerations of the joints."
     if history.status == "no-go":
         broken = joined(history.steps[-1]["plan"]["attempts"][-1]["broken"])
-        return f"No go: {broken} would not hold with 99 %, however small the manoeuvre was made."
+        return f"No go: even the smallest manoeuvre would not satisfy {broken} with 99 % probability."
     if history.status == "wrong-model":
         review = history.steps[-1]["diagnosis"]
         cause = joined(review["causes"]) if review["causes"] else "something that no cause of the catalogue explains"
         if review["causes"] and review.get("remainder") == "present":
-            cause += " and something beside that is not named"
-        return f"The model is wrong: after {flown} the recordings show {cause}. The loop stops."
+            cause += " and an unnamed cause"
+        return f"The model is wrong: after {flown}, the recordings indicate {cause}. The loop stops."
     if history.status == "reached":
-        return f"All that is wanted is reached after {flown}."
-    return f"What is wanted is not reached after {flown}; --at-most allows more."
+        return f"All goals are reached after {flown}."
+    return f"Not all goals are reached after {flown}; --at-most allows more."
 
 
 def next_sentence(history: History) -> str:
@@ -171,12 +176,12 @@ def next_sentence(history: History) -> str:
         causes = history.steps[-1]["diagnosis"]["causes"]
         known = [name for name in causes if name.partition(":")[0] in known_effects()]
         if causes:
-            step = f"add {joined(known)} to [model] effects" if known else "declare the sensors' noise as it is"
+            step = f"add {joined(known)} to [model] effects" if known else "declare the actual noise of the sensors"
             return (
-                f"Correct the model or {step}, then start again in another folder; `bayesid diagnose` of the "
-                "recordings says more."
+                f"Correct the model or {step}, then start again in another folder; `bayesid diagnose` on the "
+                "recordings gives details."
             )
-        return "`bayesid diagnose` of the recordings reconstructs the wrench that the model lacks."
+        return "Run `bayesid diagnose` on the recordings to reconstruct the wrench that is missing from the model."
     return ""
 
 

@@ -41,8 +41,8 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
         _motion_sentence(posterior),
         f"Integration step {format_number(posterior.step)} s; the largest error of the integration is "
         f"{format_number(integration_error, 2)} standard deviations of a sample.",
-        "Nothing else acts: bodies and links are rigid, and momentum changes only by the effects named here and the "
-        "external actions that were recorded.",
+        "Nothing else acts: bodies and links are rigid, and momentum changes only through the effects listed here and "
+        "the recorded external actions.",
     ]
 
 
@@ -77,8 +77,8 @@ def _prior_sentences(posterior: Posterior) -> list[str]:
 def _body_sentences(model: Model) -> list[str]:
     return _joint_prior_sentences(model) or [
         f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
-        f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
-        f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
+        f"with a relative width of {format_number(body.spread)}, so that every value corresponds to a physical body. "
+        f"The logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
         for body in model.bodies
     ]
 
@@ -95,8 +95,8 @@ def _joint_prior_sentences(model: Model) -> list[str]:
         if not prior.nuisance
     )
     return [
-        "The prior of the bodies is the posterior of an earlier study, with the changes of mass stated since: a "
-        "correlated Gaussian of their log-Cholesky coordinates, so that every value is a physical body. "
+        "The prior of the bodies is the posterior of an earlier study, with the changes of mass stated since then: a "
+        "correlated Gaussian of their log-Cholesky coordinates, so that every value corresponds to a physical body. "
         f"Masses: {masses}."
     ]
 
@@ -108,8 +108,8 @@ def _link_sentence(model: Model) -> str:
     width = format_range(prior.spread for prior in nuisance)
     names = ", ".join(prior.name for prior in nuisance)
     return (
-        f"The inertial parameters of {names} are uncertain by a relative width of {width}, which the result accounts "
-        "for. The geometry is exact."
+        f"The inertial parameters of {names} have a relative uncertainty of {width}, which the result accounts for. "
+        "The geometry is exact."
     )
 
 
@@ -118,7 +118,7 @@ def _wheel_sentences(model: Model) -> list[str]:
     if not wheels:
         return []
     listed = ", ".join(f"{wheel.name} ({format_number(wheel.inertia)} kg m2)" for wheel in wheels)
-    return [f"Wheels whose speed is known give the base their momentum; at rest they are part of it: {listed}."]
+    return [f"Wheels of known speed contribute their momentum to the base; at rest they are part of it: {listed}."]
 
 
 def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
@@ -128,22 +128,23 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
     if sensor.coloured is not None:
         level, unit = format_range(sensor.coloured.sigma), format_unit(sensor.kind.unit)
-        parts.append(f"coloured noise of {level} {unit} and {format_number(sensor.coloured.time)} s beside it")
+        time = format_number(sensor.coloured.time)
+        parts.append(f"additional coloured noise of {level} {unit} with a correlation time of {time} s")
     if isinstance(sensor.noise, Quantised):
         step = f"{format_range(sensor.noise.step)} {format_unit(sensor.kind.unit)}"
         parts.append(f"rounding to a step of {step} included in it")
     if sensor.outliers:
-        parts.append(f"outliers, up to about {format_percent(sensor.outliers)} of the readings, left out")
+        parts.append(f"outliers, up to about {format_percent(sensor.outliers)} of the readings, omitted")
     if sensor.kind is SensorKind.ACCEL:
         parts.append(f"mounted at {format_vector(np.asarray(sensor.position, dtype=float))} m in the base frame")
     if not np.allclose(sensor.rotation, np.eye(3)):
-        parts.append("turned against the base axes as declared")
+        parts.append("rotated relative to the base axes as declared")
     if sensor.filter.low_pass is not None:
         parts.append(f"low-pass at {format_number(sensor.filter.low_pass)} Hz")
     if sensor.filter.decimate > 1:
-        parts.append(f"one sample of {sensor.filter.decimate} kept")
+        parts.append(f"one sample of {sensor.filter.decimate} used")
     if sensor.filter != Filter():
-        parts.append("measurement and simulation filtered alike")
+        parts.append("measurement and simulation filtered identically")
     return "; ".join(parts) + "."
 
 
@@ -152,14 +153,14 @@ def _torque_sentences(model: Model) -> list[str]:
         return []
     width = format_range(model.torque.sigma)
     return [
-        f"Joint torques of {', '.join(model.torque.joints)}: white noise of {width} N m (N of prismatic joints) per "
-        "sample, measured at the motor's side. A joint's friction acts only as far as an effect of the model says."
+        f"Joint torques of {', '.join(model.torque.joints)}: white noise of {width} N m (N for prismatic joints) per "
+        "sample, measured on the motor side. Joint friction acts only if an effect of the model describes it."
     ]
 
 
 def _effect_sentences(model: Model) -> list[str]:
     if not model.effects:
-        return ["No effect beyond the motion of rigid bodies is in the model."]
+        return ["The model contains no effect beyond the motion of rigid bodies."]
     return [
         f"Effect {effect.label}. {effect.summary} "
         + ("Its parameters are unknowns." if effect.parameters else "It has no free parameter.")
@@ -169,7 +170,7 @@ def _effect_sentences(model: Model) -> list[str]:
 
 def _orbit_sentence(model: Model) -> str:
     if model.orbit is None:
-        return "No orbit was given: nothing of the environment acts."
+        return "No orbit was given: no environmental effect acts."
     return (
         f"Orbit: semi-major axis {format_number(model.orbit.radius / 1e3, 6)} km, eccentricity "
         f"{format_number(model.orbit.eccentricity)}."
@@ -181,12 +182,12 @@ def _motion_sentence(posterior: Posterior) -> str:
     if not measured:
         return "The motion of the joints is prescribed and exact."
     window = max(item.window for item in posterior.whitenings)
-    reach = f"correlated over up to {window} samples" if window else "which it correlates too little to matter"
+    reach = f"correlated over up to {window} samples" if window else "with negligible correlation between samples"
     jumps = sum(len(joint.jumps) for motion in measured for joint in motion.joints)
-    free = f" that leaves {counted(jumps, 'jump')} of acceleration or jerk free" if jumps else ""
+    free = f" that permits {counted(jumps, 'jump')} of acceleration or jerk" if jumps else ""
     return (
         f"The motion of the joints is a smoothing spline{free} through the samples of the encoders (last table); its "
-        f"uncertainty is carried into the noise of the sensors, {reach}."
+        f"uncertainty is propagated into the noise of the sensors, {reach}."
     )
 
 
@@ -228,6 +229,6 @@ def add_joints(document: Document, posterior: Posterior) -> None:
             ["joint", "noise per sample", "order", "chi-square per sample"],
             rows,
             "Smoothing of the joints: noise of the samples, order of the derivative of the position that is modelled "
-            "as white noise, and misfit of the samples to the spline, which is below one as far as the spline follows "
-            "their noise. Orders and misfits are those of each recording in turn.",
+            "as white noise, and misfit of the samples to the spline, which is below one to the extent that the spline "
+            "follows their noise. Orders and misfits are listed recording by recording.",
         )

@@ -50,9 +50,9 @@ def prediction_report(
     document.foot(origin)
     document.section("Result")
     document.paragraph(
-        "Final pose of base and end-effector in orbit axes: the position of their frames' origins relative to the "
-        "start of the base, and the rotation since the start as a rotation vector. Every ± is one standard deviation "
-        f"of {len(predictions[0].base.position)} draws from the present knowledge of the robot."
+        "Final pose of base and end-effector in orbit axes: the position of the origins of their frames relative to "
+        "the initial position of the base, and the rotation since the start as a rotation vector. Every ± is one "
+        f"standard deviation of {len(predictions[0].base.position)} draws from the present knowledge of the robot."
     )
     document.table(
         ["manoeuvre", "body", "quantity", "x:", "y:", "z:"],
@@ -62,8 +62,8 @@ def prediction_report(
     document.table(
         ["manoeuvre", "body", "quantity", "longest semi-axis:", "middle:", "shortest:", "direction of the longest:"],
         [row for prediction in predictions for row in region_rows(prediction)],
-        "Ellipsoids that hold the final pose with 95 % probability (normal approximation). The region of the rotation "
-        "is that of the small rotation about the predicted attitude, orbit axes.",
+        "Ellipsoids that contain the final pose with 95 % probability (normal approximation). The region of the "
+        "rotation is that of the small rotation about the predicted attitude, orbit axes.",
     )
     for manoeuvre, prediction in zip(manoeuvres, predictions, strict=True):
         document.section(f"Manoeuvre {prediction.name}")
@@ -84,8 +84,8 @@ def prediction_report(
     document.section("Assumptions")
     document.items(
         [
-            "No external force acts: the centre of mass of the whole robot rests, and the base moves only by reaction "
-            "to the arm and by its rotation. The initial linear velocity is zero.",
+            "No external force acts: the centre of mass of the whole robot remains at rest, and the base moves only by "
+            "reaction to the arm and by its rotation. The initial linear velocity is zero.",
             *(_rate_sentence(prediction) for prediction in predictions),
             "The joints follow the planned motion exactly, and the geometry of the arm is exact.",
             *planning_sentences(posterior),
@@ -98,7 +98,7 @@ def prediction_report(
 
 def _rate_sentence(prediction: Prediction) -> str:
     if not prediction.rate.any():
-        return f"{prediction.name}: the base starts at rest; its recording holds no initial rate."
+        return f"{prediction.name}: the base starts at rest; its recording contains no initial rate."
     rate = format_vector(prediction.rate)
     return f"{prediction.name}: the base starts with the first measured rate, {rate} rad/s, taken as exact."
 

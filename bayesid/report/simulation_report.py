@@ -41,7 +41,7 @@ def simulation_report(
         Title of the study.
     file : path
     planned : bool
-        Whether the manoeuvres were planned, so that there are no readings beside which the simulated ones could stand.
+        Whether the manoeuvres were planned, so that there are no readings to compare with the simulated ones.
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
@@ -62,16 +62,13 @@ def simulation_report(
         "Largest simulated readings per sensor axis, with the robot as given.",
     )
     z = posterior.starting_point()
-    beside = (
-        "Readings as simulated with the robot as given, beside those of the study's recording; beneath, the residual "
-        "in σ."
-    )
+    beside = "Readings simulated with the robot as given, and those of the study's recording; below, the residual in σ."
     if planned:
         pairs = zip(posterior.manoeuvres, recordings, strict=True)
         posterior = with_manoeuvres(posterior, [replace(flown, recording=recording) for flown, recording in pairs])
         beside = (
-            "Readings as simulated with the robot as given, without noise and, drawn as measured, as they are written; "
-            "beneath, their difference in σ."
+            "Readings simulated with the robot as given: without noise, and as written to the file (drawn as "
+            "measured); below, their difference in σ."
         )
     fits = sensor_fits(posterior, z)
     for index, recording in enumerate(recordings):

@@ -57,12 +57,12 @@ def record_sentence(status: Status) -> str | None:
     if share is None or not share.total:
         return None
     said = {
-        Status.EXPLAINED: f"of the verdicts that explained the data, {share} named nothing but what was hidden",
-        Status.PARTLY_EXPLAINED: f"of the verdicts that explained a part, {share} named nothing but what was hidden",
-        Status.AMBIGUOUS: f"of the ambiguous verdicts, {share} held what was hidden among their alternatives",
-        Status.UNKNOWN: f"of the verdicts of something unknown, {share} met something outside the catalogue",
-        Status.UNRESOLVED: f"of the unresolved verdicts, {share} met something hidden",
-        Status.ADEQUATE: f"where nothing was hidden, {record['quiet']} raised no alarm; where something of seven "
-        f"standard deviations and more was, {record['loud']} raised one",
+        Status.EXPLAINED: f"of the verdicts that explained the data, {share} named only injected causes",
+        Status.PARTLY_EXPLAINED: f"of the verdicts that explained part of the data, {share} named only injected causes",
+        Status.AMBIGUOUS: f"of the ambiguous verdicts, {share} listed the injected causes among their alternatives",
+        Status.UNKNOWN: f"of the verdicts of an unknown cause, {share} followed an injection outside the catalogue",
+        Status.UNRESOLVED: f"of the unresolved verdicts, {share} followed an injection",
+        Status.ADEQUATE: f"without an injection, {record['quiet']} raised no alarm; with an injection of at least "
+        f"seven standard deviations, {record['loud']} raised one",
     }
-    return f"In blind trials of this method with known answers: {said[status]}; in brackets the 95 % interval."
+    return f"In blind trials of this method with known answers: {said[status]}; the 95 % interval is in brackets."

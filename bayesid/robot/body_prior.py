@@ -49,9 +49,9 @@ class BodyPrior:
             )
         if not self.centre.is_extended:
             raise InputError(
-                f"the prior of {self.name} centres on a body without extent (mass {self.centre.mass:g} kg)",
+                f"the prior of {self.name} is centred on a body without extent (mass {self.centre.mass:g} kg)",
                 place=f"link {self.name}",
-                remedy="Give mass and inertia of a body with volume, or leave it out of the unknowns",
+                remedy="Give mass and inertia of a body with volume, or remove it from the unknowns",
             )
 
 
@@ -69,7 +69,7 @@ def check_mixing(mixing: Mixing, bodies: int) -> None:
     factor = np.array(mixing) if square else np.zeros((0, 0))
     if not square or not np.isfinite(factor).all() or np.triu(factor, 1).any() or not (np.diag(factor) > 0.0).all():
         raise InputError(
-            f"the joint prior of {bodies} bodies is not a lower-triangular factor of {count} rows",
+            f"the joint prior of {bodies} bodies is not a lower-triangular factor with {count} rows",
             remedy="Give the Cholesky factor of the covariance of all their log-Cholesky coordinates",
         )
 

@@ -139,7 +139,7 @@ class InertialParameters:
 
     @property
     def is_extended(self) -> bool:
-        """Whether the mass fills a volume, as log-Cholesky coordinates require; that of a rod or a point does not."""
+        """Whether the mass fills a volume, as log-Cholesky coordinates require; that of a rod or point does not."""
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.pseudo_inertia / self.mass)[0] > 1e-12)
 
 
@@ -231,7 +231,9 @@ class BodyChange:
 
     def __post_init__(self) -> None:
         if self.mass == 0.0:
-            raise InputError("the mass is 0", place=self.body, remedy="Give what was added, or what was removed as < 0")
+            raise InputError(
+                "the mass is 0", place=self.body, remedy="Give the added mass, or the removed mass as a negative number"
+            )
         _ = self.vector
 
     @property

@@ -111,9 +111,11 @@ def _refuse_loops(model: Any, mujoco: Any, file: Path) -> None:
         kind = mujoco.mjtEq(model.eq_type[index])
         if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
             problem = f"the constraint <{_word(kind)}> is not supported"
-            raise InputError(problem, file=file, place="equality", remedy="Leave a tree of bodies")
+            raise InputError(problem, file=file, place="equality", remedy="Reduce the model to a tree of bodies")
     if model.nflex:
-        raise InputError("a flexible body is not supported", file=file, remedy="Leave a tree of rigid bodies")
+        raise InputError(
+            "a flexible body is not supported", file=file, remedy="Reduce the model to a tree of rigid bodies"
+        )
 
 
 def _word(kind: Any) -> str:
@@ -130,13 +132,13 @@ def _base(model: Any, mujoco: Any, links: list[str], file: Path) -> int:
     ]
     if len(trees) != 1:
         shown = f": {', '.join(links[body] for body in trees)}" if trees else ""
-        problem = f"the world holds {len(trees)} bodies{shown}"
-        raise InputError(problem, file=file, place="worldbody", remedy="Leave one, the base of the robot")
+        problem = f"the world contains {len(trees)} bodies{shown}"
+        raise InputError(problem, file=file, place="worldbody", remedy="Reduce it to one body, the base of the robot")
     (base,) = trees
     first = model.body_jntadr[base]
     kinds = [mujoco.mjtJoint(kind) for kind in model.jnt_type[first : first + model.body_jntnum[base]]]
     if kinds and kinds != [mujoco.mjtJoint.mjJNT_FREE]:
-        problem = f"a {_word(kinds[0])} joins it to the world, where only a free joint can"
+        problem = f"a {_word(kinds[0])} connects it to the world, where only a free joint is allowed"
         remedy = "The base flies freely: give it a free joint or none"
         raise InputError(problem, file=file, place=f"body {links[base]}", remedy=remedy)
     return base
@@ -157,7 +159,7 @@ def _add_joints(
         turns = kind == mujoco.mjtJoint.mjJNT_HINGE
         if not turns and kind != mujoco.mjtJoint.mjJNT_SLIDE:
             problem = f"joint type {_word(kind)!r} is not supported"
-            remedy = "Give bodies hinges or slides, and only the base a free joint"
+            remedy = "Use hinges or prismatic joints, and a free joint for the base only"
             raise InputError(problem, file=file, place=f"joint {joints[index]}", remedy=remedy)
         axis, anchor = model.jnt_axis[index], pin.SE3(np.eye(3), model.jnt_pos[index])
         back = -float(model.qpos0[model.jnt_qposadr[index]])

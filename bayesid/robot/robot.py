@@ -112,7 +112,7 @@ class Robot(ShortForm):
         ----------
         file : path
         nearest_physical : bool
-            Whether a link that is no physical body takes the nearest physical inertia, with a remark.
+            Whether an unphysical link inertia is replaced by the nearest physical one, with a remark.
 
         Raises
         ------
@@ -139,11 +139,11 @@ class Robot(ShortForm):
 
     @classmethod
     def shipped(cls, name: str) -> Robot:
-        """Return a robot of the package by its name, ``"ets7"`` or ``"planar"``."""
+        """Return a built-in robot by its name, ``"ets7"`` or ``"planar"``."""
         folder = files("bayesid.robot") / "models"
         known = sorted(Path(str(entry)).stem for entry in folder.iterdir() if str(entry).endswith(".urdf"))
         if name not in known:
-            raise InputError(f"no shipped robot {name!r}", remedy=f"Choose one of {', '.join(known)}")
+            raise InputError(f"no built-in robot {name!r}", remedy=f"Choose one of {', '.join(known)}")
         return cls.from_urdf(Path(str(folder / f"{name}.urdf")))
 
     @classmethod
@@ -154,7 +154,7 @@ class Robot(ShortForm):
         ----------
         urdf : str or bytes
         file : Path, optional
-            Named in errors.
+            File that error messages name.
         nearest_physical : bool
             As in `from_urdf`.
         """
@@ -227,7 +227,7 @@ class Robot(ShortForm):
         """Return the robot with a rigid body fixed on a link."""
         if load.name in self.links:
             raise InputError(
-                f"the name {load.name!r} is taken by a link", file=self.file, remedy="Give the load another name"
+                f"the name {load.name!r} is already used by a link", file=self.file, remedy="Give the load another name"
             )
         carrier = self.link(load.link)
         links = {**self.links, load.name: Link(load.inertial, carrier.joint, carrier.placement)}
@@ -236,7 +236,7 @@ class Robot(ShortForm):
     def with_wheel(self, wheel: Wheel) -> Robot:
         """Return the robot with a reaction wheel, whose rotor at rest is part of the base already."""
         if wheel.name in [other.name for other in self.wheels]:
-            raise InputError(f"two wheels are named {wheel.name!r}", remedy="Give each a name of its own")
+            raise InputError(f"two wheels are named {wheel.name!r}", remedy="Give each wheel a unique name")
         return replace(self, wheels=(*self.wheels, wheel))
 
     def wheel_index(self, name: str) -> int:

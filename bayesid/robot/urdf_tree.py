@@ -66,7 +66,7 @@ def _refuse_xacro(element: ET.Element, file: Path | None) -> None:
     used = used or next((f'{key}="{text}"' for key, text in element.items() if "${" in text or "$(" in text), None)
     if used:
         source = file.name if file else "FILE"
-        problem = f"this is an unexpanded xacro: it holds {used}"
+        problem = f"this is an unexpanded xacro: it contains {used}"
         raise InputError(problem, file=file, remedy=f"Expand it first: xacro {source} > robot.urdf")
 
 
@@ -160,10 +160,10 @@ def _without_world(root: ET.Element, file: Path | None, remarks: list[str]) -> N
             break
         root.remove(tops[0])
         root.remove(hung[0])
-        remarks.append(f"The link {name} and its {kind} joint are left out: the robot flies freely.")
+        remarks.append(f"The link {name} and its {kind} joint are omitted, because the robot flies freely.")
     for joint, _, child in _joints(root):
         if joint.get("type") == "floating":
-            problem = f"joint type 'floating' is supported only below a root link without mass; it holds {child!r}"
+            problem = f"joint type 'floating' is supported only below a root link without mass; its child is {child!r}"
             remedy = f"Use one of {', '.join(MOVING)} or fixed; the base needs no joint, since it flies freely"
             raise InputError(problem, file=file, place=f"joint {joint.get('name', '')}", remedy=remedy)
 
@@ -174,8 +174,8 @@ def _tree_root(root: ET.Element, file: Path | None) -> str:
     for kind, given in (("links", names), ("joints", [joint.get("name", "") for joint in root.findall("joint")])):
         doubled = [name for name, count in Counter(given).items() if count > 1]
         if doubled:
-            problem = f"several {kind} have one name: {', '.join(map(repr, doubled))}"
-            raise InputError(problem, file=file, remedy="Give each a name of its own")
+            problem = f"several {kind} share one name: {', '.join(map(repr, doubled))}"
+            raise InputError(problem, file=file, remedy="Give each a unique name")
     holders: dict[str, list[str]] = {}
     for joint, parent, child in _joints(root):
         holders.setdefault(child, []).append(f"{parent} (joint {joint.get('name', '')})")
@@ -185,11 +185,11 @@ def _tree_root(root: ET.Element, file: Path | None) -> str:
                 f"it has {len(held_by)} parents, {' and '.join(held_by)}, which closes a loop",
                 file=file,
                 place=f"link {child}",
-                remedy="Closed chains are not supported: cut the loop by leaving one of the joints out",
+                remedy="Closed chains are not supported: cut the loop by omitting one of the joints",
             )
     tops = [name for name in names if name not in holders]
     if not names or not tops:
-        problem = "the links form a loop without a root" if names else "it holds no link"
+        problem = "the links form a loop without a root" if names else "it contains no link"
         raise InputError(problem, file=file, remedy="Give a tree of links, whose root is the base body")
     if len(tops) > 1:
         remedy = "Give one tree of links, whose root is the base body: join the others to it or remove them"
@@ -224,7 +224,7 @@ def _open_limits(root: ET.Element, remarks: list[str]) -> None:
             limit.set("velocity", f"{BOUNDLESS:g}")
         limit.set("effort", limit.get("effort") or f"{BOUNDLESS:g}")
     if opened:
-        remarks.append(f"Limits of zero count as not given ({'; '.join(opened)}).")
+        remarks.append(f"Limits of zero are treated as not given ({'; '.join(opened)}).")
 
 
 def _zero(limit: ET.Element, key: str) -> bool:
@@ -264,15 +264,15 @@ def _physical_inertials(
         refused.append((f"{place}: {problem.problem}", entries))
     if refused and take_nearest:
         remarks += [
-            f"{text[0].upper()}{text[1:]}. The nearest physical inertia is taken: {entries}."
+            f"{text[0].upper()}{text[1:]}. The nearest physical inertia is used: {entries}."
             for text, entries in refused
         ]
     elif refused:
         raise InputError(
             "; ".join(f"{text} (nearest physical inertia in the link's axes: {entries})" for text, entries in refused),
             file=file,
-            remedy="Correct the inertias, or take the nearest ones: nearest_physical = true in [robot] of the study, "
-            "or bayesid init --nearest-physical",
+            remedy="Correct the inertias, or use the nearest physical ones: nearest_physical = true in [robot] of the "
+            "study, or bayesid init --nearest-physical",
         )
     return inertials
 
@@ -285,7 +285,7 @@ def _given_inertial(link: ET.Element, file: Path | None, place: str) -> tuple[fl
     mass, tensor = element.find("mass"), element.find("inertia")
     if mass is None or tensor is None:
         problem = "<inertial> lacks its <mass> or <inertia>"
-        raise InputError(problem, file=file, place=place, remedy="Give both, or leave <inertial> out")
+        raise InputError(problem, file=file, place=place, remedy="Give both, or omit <inertial>")
     rotation, com = _pose(element, file, place)
     matrix, halves = np.zeros((3, 3)), np.zeros((3, 3))
     try:
@@ -348,7 +348,9 @@ def _take_inertia_of_rigid_body(
                 body.mass, rotation @ body.com + position, rotation @ body.inertia @ rotation.T
             )
             inertials[name] = InertialParameters(0.0, np.zeros(3), np.zeros((3, 3)))
-            remarks.append(f"The root link {base} has no inertia; it takes that of {name}, rigidly joined to it.")
+            remarks.append(
+                f"The root link {base} has no inertia; that of {name}, which is rigidly attached to it, is used."
+            )
             return
         for joint, parent, child in _joints(root):
             if parent == name and joint.get("type") == "fixed":

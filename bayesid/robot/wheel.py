@@ -28,7 +28,7 @@ class Wheel:
     inertia : float
         Moment of inertia about the axis [kg m2].
     position : (3,) array_like
-        Centre of the rotor in the base [m]; it matters for an imbalance alone.
+        Centre of the rotor in the base [m]; used only for an imbalance.
 
     Raises
     ------

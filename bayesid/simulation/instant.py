@@ -131,7 +131,7 @@ class Modes(NamedTuple):
     Attributes
     ----------
     omega : (n,) array
-        Angular frequencies with the base held [rad/s].
+        Angular frequencies for a fixed base [rad/s].
     damping : (n,) array
         Damping ratios.
     linear : (n, 3) array

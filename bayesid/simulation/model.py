@@ -34,7 +34,7 @@ class Manoeuvre(ShortForm):
     Parameters
     ----------
     recording : Recording
-        Readings of the sensors; a recording that is only to be simulated may lack them.
+        Readings of the sensors; a recording used only for simulation may lack them.
     motion : Motion
         Motion of the joints.
     attitude : (4,) array_like
@@ -44,7 +44,7 @@ class Manoeuvre(ShortForm):
     argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     blocks_per_second : float
-        Rate above which the samples of a sensor are averaged over blocks [1/s]; 0 keeps every sample.
+        Rate above which the samples of a sensor are averaged over blocks [1/s]; 0 disables averaging.
     """
 
     recording: Recording
@@ -112,8 +112,8 @@ class Model(ShortForm):
         for effect in self.effects:
             if (lacking := effect.lacks(self)) is not None:
                 raise InputError(
-                    f"effect {effect.label!r} cannot act without {lacking}, which the study does not have",
-                    remedy=f"Give {lacking} or leave the effect out",
+                    f"effect {effect.label!r} requires {lacking}, which the study does not contain",
+                    remedy=f"Give {lacking} or omit the effect",
                 )
         object.__setattr__(self, "effects", tuple(effect.attach(self.robot) for effect in self.effects))
         labels = [effect.label for effect in self.effects]
@@ -131,8 +131,8 @@ class Model(ShortForm):
         for effect in self.effects:
             if effect.uses("friction") and isinstance(effect, OnJoint) and effect.place not in measured:
                 raise InputError(
-                    f"effect {effect.label!r} shows in the joint's torque only, which is not measured",
-                    remedy="Add [sensors.torque] or leave the effect out",
+                    f"effect {effect.label!r} affects only the joint's torque, which is not measured",
+                    remedy="Add [sensors.torque] or omit the effect",
                 )
         if self.torque is None:
             return
@@ -140,13 +140,13 @@ class Model(ShortForm):
         for effect in self.effects:
             if effect.uses("table") and effect.link is None:
                 raise InputError(
-                    f"effect {effect.label!r} is not carried into the joint torques",
-                    remedy="Leave [sensors.torque] or the effect out",
+                    f"effect {effect.label!r} is not modelled in the joint torques",
+                    remedy="Omit [sensors.torque] or the effect",
                 )
 
     @property
     def without_torque(self) -> Model:
-        """The same model without torque sensors and without effects that only they can read."""
+        """The same model without torque sensors and without effects that only they measure."""
         rest = tuple(effect for effect in self.effects if not effect.uses("friction"))
         return self if self.torque is None and rest == self.effects else replace(self, torque=None, effects=rest)
 

@@ -71,7 +71,7 @@ def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) ->
             raise _fault(effect, hook, f"it fails: {type(error).__name__}: {message}") from error
         shapes = jax.tree.map(np.shape, result)
         if expected is not None and shapes != expected:
-            raise _fault(effect, hook, f"it returns the shape {shapes} where {expected} is due")
+            raise _fault(effect, hook, f"it returns the shape {shapes} instead of {expected}")
         if not all(np.isfinite(np.asarray(leaf)).all() for leaf in jax.tree.leaves(result)):
             raise _fault(effect, hook, "it returns numbers that are not finite")
     _PASSED.add(trial)
@@ -82,7 +82,7 @@ def _fault(effect: Effect, hook: str, problem: str) -> InputError:
         problem,
         file=inspect.getsourcefile(type(effect)),
         place=f"effect {effect.label!r}: {hook}",
-        remedy=f"Correct the effect; help(bayesid.Effect.{hook}) says what it returns",
+        remedy=f"Correct the effect; help(bayesid.Effect.{hook}) describes its return value",
     )
 
 

@@ -75,7 +75,7 @@ class NoiseDensity:
 
 @dataclass(frozen=True)
 class StarTracker:
-    """Noise of a rate that is differenced from a star sensor's attitude of a given error per sample [arcsec]."""
+    """Noise of a rate differenced from the attitude of a star tracker with a given error per sample [arcsec]."""
 
     arcsec: float | tuple[float, float, float]
 
@@ -133,7 +133,7 @@ class Filter:
     low_pass : float, optional
         Cut-off frequency, at half amplitude [Hz].
     decimate : int
-        Number n of which every n-th sample is kept.
+        Decimation factor n: every n-th sample is used.
     """
 
     low_pass: float | None = None
@@ -147,7 +147,7 @@ class Filter:
         if not 0.0 < cut < 0.5:
             raise InputError(
                 f"low_pass {self.low_pass:g} Hz is not below half the sampling rate, {0.5 / interval:g} Hz",
-                remedy="Choose a lower cut-off or leave it out",
+                remedy="Choose a lower cut-off or omit it",
             )
         half = int(np.ceil(1.65 / cut))  # the transition band of a Hamming window is then as wide as the pass band
         n = np.arange(-half, half + 1)

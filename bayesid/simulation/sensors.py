@@ -87,14 +87,14 @@ class Poorest(NamedTuple):
 
 
 class Instrument(NamedTuple):
-    """What is known of the instruments of a kind, from which the names, priors and bounds of its faults follow.
+    """Properties of the instruments of a kind, which determine the names, priors and bounds of its faults.
 
     Attributes
     ----------
     name : str
-        What an instrument is called, by default the kind's name and "sensor".
+        Name of an instrument, by default the kind's name and "sensor".
     measures, idle : str
-        What the readings are proportional to, and when they should be zero.
+        Quantity to which the readings are proportional, and condition under which they should be zero.
     bias_sigma : float
         Standard deviation of the prior of a constant error, in the kind's unit.
     drift_sigma : float, optional
@@ -105,7 +105,7 @@ class Instrument(NamedTuple):
 
     name: str = ""
     measures: str = "what it measures"
-    idle: str = "beside what it measures"
+    idle: str = "in addition to what it measures"
     bias_sigma: float = 0.03
     drift_sigma: float | None = None
     poorest: Poorest | None = None
@@ -133,7 +133,7 @@ class SensorKind:
     slip : str
         Unit that users most often give by mistake.
     instrument : Instrument
-        What is known of its instruments, from which the systematic faults of the sensor follow.
+        Properties of its instruments, which determine the systematic faults of the sensor.
     """
 
     value: ClassVar[str]
@@ -232,7 +232,7 @@ class SensorKind:
         readings : (n, axes) array
             Readings of one sensor.
         weight : (n,) array
-            Their weights, of which those of one mean have the sum one.
+            Their weights, which sum to one for each mean.
         first : (b,) integer array
             Number of the first reading of each mean.
         """
@@ -378,7 +378,7 @@ class Sensor:
     coloured : Coloured, optional
         Correlated noise in addition to the white noise.
     outliers : float
-        Fraction of the readings that are lost or garbled, and are left out.
+        Fraction of the readings that are lost or corrupted, and are omitted.
     """
 
     kind: SensorKind

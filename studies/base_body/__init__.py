@@ -1,4 +1,4 @@
-"""Section 4.1 of the paper, identification of the base body, beside what the paper printed; and what it left open."""
+"""Section 4.1 of the paper: identification of the base body, compared with the printed results."""
 
 from studies.base_body.report import STUDY, BaseBody, run
 

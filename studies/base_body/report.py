@@ -21,7 +21,7 @@ WANTED = 0.01  # relative standard deviation of the mass that is wanted from one
 LEVEL = 0.95  # level of the region of the sampled posterior that should hold the truth
 
 # what gives masses their scale where motion cannot
-WAY_OUT = "measured joint torques or a known thrust would (reports on the whole system and on base parameters)"
+WAY_OUT = "measured joint torques or a known thrust do (reports on the whole system and on base parameters)"
 
 
 def _report(result: BaseBody) -> Report[BaseBody]:
@@ -32,35 +32,38 @@ def _report(result: BaseBody) -> Report[BaseBody]:
     return Report(
         title="Base body of ETS-VII",
         subtitle="Problem 1 and section 4.1 of Lampariello and Hirzinger (IDETC 2005)",
-        question="How well does one manoeuvre of the arm identify mass, centre of mass and inertia of the base, with "
-        "realistic sensors, at the speed that the flight's rule permits?",
-        answer="At the permitted speed the mass of the base gets, to first order at the truth, a standard deviation of "
-        f"{format_percent(permitted[MASS], 2)} if the arm is known exactly ({format_percent(faster[MASS], 2)} if flown "
-        f"{format_fixed(result.slowness, 1)} times faster), and of {format_percent(known[MASS], 2)} if the arm is "
-        f"known to 5 %, which no rate sensor, attitude sensor or accelerometer mends; {WAY_OUT}.",
-        valid="the posture, period and joint zeros that the paper does not print are as assumed here, noise is white "
-        "and the arm's error is independent from link to link. Sampled posteriors are of the faster manoeuvre alone.",
+        question="How well does one manoeuvre of the arm determine mass, centre of mass and inertia of the base, with "
+        "realistic sensors, at the speed that the flight rule permits?",
+        answer="One manoeuvre at the permitted speed determines the base's mass to "
+        f"{format_percent(permitted[MASS], 2)} (1 sigma), if the arm is known exactly. To first order at the truth it "
+        f"is {format_percent(faster[MASS], 2)} if flown {format_fixed(result.slowness, 1)} times faster, and "
+        f"{format_percent(known[MASS], 2)} if the arm is uncertain by 5 % (1 sigma); no rate sensor, attitude sensor "
+        f"or accelerometer improves the latter, but {WAY_OUT}.",
+        valid="the posture, period and joint zeros, which the paper does not print, are as assumed here, noise is "
+        "white and the arm's errors are independent from link to link. Posteriors were sampled for the faster "
+        "manoeuvre only.",
         goals=goals_of(result),
         full=bool(result.sampled),
         figure=Picture(
             tables.precision_figure(result),
             "Relative standard deviation of the ten parameters after one manoeuvre, to first order at the truth, with "
-            f"a star sensor of 2″ and an accelerometer of {format_number(GRADES[0])} m/s².",
+            f"a star tracker of 2″ and an accelerometer of {format_number(GRADES[0])} m/s².",
         ),
         setup=Setup(
             robot="ETS-VII: the paper's base, and an arm of six joints and 140 kg from public models.",
             manoeuvre=f"The paper's optimum of (26). At the permitted speed it takes {slow.duration:.0f} s and the tip "
-            f"moves with {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base then turns with "
-            f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s at most. The faster one, "
-            f"{format_fixed(result.slowness, 1)} times, breaks the rule; with it the base turns with "
+            f"moves at up to {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base turns at up to "
+            f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s. The version flown "
+            f"{format_fixed(result.slowness, 1)} times faster violates the rule; it turns the base at up to "
             f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases "
-            "without noise and sampled posteriors are of the faster one.",
-            sensors=f"At 2 Hz: attitude of a star sensor with 2″, an accelerometer of {format_number(GRADES[0])} m/s² "
+            "without noise and sampled posteriors use the faster version.",
+            sensors=f"At 2 Hz: star tracker attitude with 2″, an accelerometer of {format_number(GRADES[0])} m/s² "
             "with an unknown constant bias (prior 10⁻⁴ m/s²), and joint encoders of 10⁻⁶ rad where the posterior is "
             "sampled.",
-            known="Orbit, and the arm: exactly, or every link to 5 % of its mass (relative width 0.025).",
-            unknown="Ten parameters of the base, initial rate, bias, and the arm within its prior. Where it is "
-            "sampled, the prior is centred on the paper's initial guess with a relative width of one.",
+            known="Orbit, and the arm: exactly, or with each link's mass uncertain by 5 % (1 sigma; relative width "
+            "0.025).",
+            unknown="Ten parameters of the base, initial rate, bias, and the arm within its prior. Where the posterior "
+            "is sampled, the prior is centred on the paper's initial guess with a relative width of one.",
             replicates="One recording of each manoeuvre; coverage over many recordings is in the report on "
             "calibration.",
         ),
@@ -79,8 +82,8 @@ def _report(result: BaseBody) -> Report[BaseBody]:
                 tables.readings(result),
             ),
         ],
-        beside="Beside this report: all estimates without noise ({0}), standard deviations by grade of accelerometer "
-        "({1}), and what each unit of the paper's sigma would mean ({2}).",
+        beside="Tables with this report: all estimates without noise ({0}), standard deviations by grade of "
+        "accelerometer ({1}), and what each unit of the paper's sigma would mean ({2}).",
     )
 
 
@@ -97,7 +100,7 @@ def goals_of(result: BaseBody) -> list[Goal]:
         *(
             Goal(
                 f"sd of the mass, to first order, at most {format_percent(WANTED)} at the permitted speed, arm "
-                f"{'exact' if arm == 'exact' else 'known to 5 %'}",
+                f"{'exact' if arm == 'exact' else 'uncertain by 5 % (1 sigma)'}",
                 format_percent(float(width := result.precision[f"permitted, arm {arm}"][MASS]), 2),
                 Verdict.of(width <= WANTED),
             )
@@ -115,8 +118,8 @@ def _held(result: BaseBody, arm: str) -> Goal:
     """Return the goal on the truth in the sampled posterior, and on the agreement of the three methods."""
     limit = float(stats.chi2.ppf(LEVEL, 10))
     text = (
-        f"faster manoeuvre, arm {'exact' if arm == 'exact' else 'known to 5 %'}: emcee, importance sampling and mode "
-        f"agree, and the {format_percent(LEVEL)} region holds the truth (squared distance at most "
+        f"faster manoeuvre, arm {'exact' if arm == 'exact' else 'uncertain by 5 % (1 sigma)'}: emcee, importance "
+        f"sampling and mode agree, and the {format_percent(LEVEL)} region contains the truth (squared distance at most "
         f"{format_fixed(limit, 1)})"
     )
     if arm not in result.sampled:
@@ -132,32 +135,32 @@ def _held(result: BaseBody, arm: str) -> Goal:
 
 
 def _negatives(document: Document, result: BaseBody) -> None:
-    document.section("What goes wrong, and what cannot be had")
+    document.section("Failures and limits")
     well, poor = result.noise_free["well"], result.noise_free["poor"]
     blind = result.noise_free["well, no gradient"]
     samples = 6 * len(blind.recording.time)
     bias = float((np.abs(blind.error) / blind.uncertainty).max())
     loss = poor.uncertainty / well.uncertainty
     texts = [
-        f"{_gradient(result)} After one manoeuvre with noise of 10⁻⁵ rad/s and 10⁻⁵ m/s² the former is up to "
-        f"{format_number(bias, 2)} standard deviations, and more manoeuvres do not remove it. The residual it leaves "
-        f"is {format_number(blind.misfit, 2)} of the noise, which no plot shows; its chi² is "
+        f"{_gradient(result)} After one manoeuvre with noise of 10⁻⁵ rad/s and 10⁻⁵ m/s² the first of these errors is "
+        f"up to {format_number(bias, 2)} standard deviations, and more manoeuvres do not remove it. The residual it "
+        f"causes is {format_number(blind.misfit, 2)} of the noise, which no plot would reveal; its chi² is "
         f"{format_number(blind.misfit**2 * samples, 2)}.",
         "The scale of all masses comes from the arm alone: the equations of motion are homogeneous in the masses, "
-        "gravity gradient included. Arm links known to 5 % leave the base's mass at "
-        f"{format_percent(float(result.precision['permitted, arm 5 %'][MASS]), 2)}, and the best accelerometer of "
-        f"section 4.3 ({format_number(GRADES[-1])} m/s²) at {format_percent(float(result.grades['5 %'][-1, MASS]), 2)} "
-        "(faster manoeuvre). Measured joint torques, a known thrust or one known body would give the scale too "
+        "gravity gradient included. With arm links uncertain by 5 % (1 sigma), the base's mass is uncertain by "
+        f"{format_percent(float(result.precision['permitted, arm 5 %'][MASS]), 2)}, and with the best accelerometer of "
+        f"section 4.3 ({format_number(GRADES[-1])} m/s²) by {format_percent(float(result.grades['5 %'][-1, MASS]), 2)} "
+        "(faster manoeuvre). Measured joint torques, a known thrust or one known body would also provide the scale "
         "(reports on the whole system and on base parameters).",
         f"The poorly exciting manoeuvre, whose rate about z peaks at {format_fixed(1e3 * float(poor.peak[2]), 2)} "
-        f"mrad/s, costs nothing without noise; with noise izz is {format_fixed(float(loss[6]), 1)} and ixy "
+        f"mrad/s, loses nothing without noise; with noise izz is {format_fixed(float(loss[6]), 1)} and ixy "
         f"{format_fixed(float(loss[7]), 1)} times more uncertain.",
-        "The printed optimum leaves the joint limits of ±π/2 that the paper states: "
+        "The printed optimum exceeds the joint limits of ±π/2 that the paper states: "
         + "; ".join(
             f"joint {joint} moves from {format_number(low)} to {format_number(high)} rad"
             for joint, low, high in limits_broken()
         )
-        + ". It was taken as printed.",
+        + ". It was used as printed.",
     ]
     document.items(texts)
 
@@ -187,22 +190,23 @@ def _evidence(document: Document, result: BaseBody) -> None:
     )
     document.figure(
         tables.error_figure(result),
-        "Relative errors without noise, of the paper's printed results and of those found here; the line is the goal.",
+        "Relative errors without noise: the paper's printed results and those of this study; the line is the goal.",
     )
     header, widths = tables.precision_table(result)
     document.table(
         header,
         widths,
         f"Relative standard deviations after one manoeuvre at the permitted speed, and {result.slowness:.1f} times "
-        "faster. The mass needs accelerations, which fall with the square of the speed; the star sensor sees the other "
-        "parameters in more samples of the same rotation, and the gravity gradient has longer to act.",
+        "faster. The mass follows from accelerations, which fall with the square of the speed. For the other "
+        "parameters slow flight helps: the star tracker takes more samples of the same rotation, and the gravity "
+        "gradient acts longer.",
         columns("lrrrr"),
     )
     if result.sampled:
         document.figure(
             tables.posterior_figure(result),
-            "Sampled posterior (mean and standard deviation, faster manoeuvre) beside the results that the paper "
-            "printed; triangles mark what lies beyond the panel.",
+            "Sampled posterior (mean and standard deviation, faster manoeuvre) and the results that the paper printed; "
+            "triangles mark values beyond the panel.",
         )
         document.items([tables.sampler_sentence(name, identified) for name, identified in result.sampled.items()])
 
@@ -217,7 +221,7 @@ def _statements(result: BaseBody) -> list[Statement]:
             f"Well exciting, the errors are up to {_worst(paper.RESULT_WELL)}; poorly exciting, up to "
             f"{_worst(paper.RESULT_POOR)} (4.1).",
             Finding.REFUTED,
-            f"As limits of the problem: without noise both are exact, to {format_number(well, 1)} and "
+            f"These errors are no limit of the problem: without noise both are exact to {format_number(well, 1)} and "
             f"{format_number(poor, 1)}. If the paper's data came from its model, its optimiser stopped early.",
         ),
         Statement(
@@ -226,40 +230,40 @@ def _statements(result: BaseBody) -> list[Statement]:
             f"With noise: a moment of inertia is up to {format_fixed(float(loss.max()), 1)} times more uncertain.",
         ),
         Statement(
-            "Noise of sigma 0.04 leaves an error of about 2 % in three dimensions too (4.3).",
+            "Noise of sigma 0.04 causes an error of about 2 % in three dimensions too (4.3).",
             Finding.CONFIRMED if max(reading.mass, reading.moment) <= CLAIM else Finding.REFUTED,
-            "Read, as in the report on sensors, as degrees per second and the same share of an accelerometer's peak: "
-            f"one faster manoeuvre leaves, to first order at the truth, {format_percent(reading.mass, 2)} in the mass "
-            f"and {format_percent(reading.moment, 2)} in the worst moment; 2 % take "
-            f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on sensors has these beside the "
-            "errors over drawn noise. The paper prints no unit.",
+            "The paper prints no unit. Read as degrees per second, with the same share of an accelerometer's peak, as "
+            "in the report on sensors: after one faster manoeuvre the mass is uncertain by "
+            f"{format_percent(reading.mass, 2)} and the worst moment by {format_percent(reading.moment, 2)}, to first "
+            f"order at the truth; 2 % take {format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on "
+            "sensors compares these values with the errors over drawn noise.",
         ),
     ]
 
 
 def _assumptions(document: Document, _: BaseBody) -> None:
-    document.section("Assumptions where the paper is silent")
+    document.section("Assumptions on what the paper does not state")
     wrist = ", ".join(format_number(value) for value in extended_wrist())
     document.items(
         [
-            f"The faster manoeuvre has a period of {PERIOD:g} s, two oscillations, and splines of {RAMP:g} s that meet "
-            "position, speed and acceleration of the oscillation. Without noise the period does not matter.",
+            f"The faster manoeuvre has a period of {PERIOD:g} s, two oscillations, and splines of {RAMP:g} s that "
+            "match position, speed and acceleration of the oscillation. Without noise the period does not matter.",
             f"Joint zeros, axes and link frames are those of public models; joints 4 to 6 rest at ({wrist}) rad, where "
-            "the tip is farthest from joint 3. The paper's q may thus be another motion here.",
+            "the tip is farthest from joint 3. The paper's q may therefore be a different motion here.",
             "The poorly exciting manoeuvre is q = (0.68, −0.03, 1.04, −0.53, 1.17, −0.37), from a search for the "
-            "smallest rate about z; the paper does not print its own.",
+            "smallest rate about z; the paper does not print its values.",
             "The base starts at rest; the paper's inertias are about the centre of mass; the accelerometer sits at "
-            "(0.4, 0.3, 0.8) m and is compared as it reads. Links 2 to 6 are the paper's 1/25 of the base; for 1/7 "
-            "they are scaled.",
+            "(0.4, 0.3, 0.8) m and its raw readings are compared. Links 2 to 6 have 1/25 of the base's mass, as in the "
+            "paper; for 1/7 they are scaled.",
         ]
     )
 
 
 STUDY = Study(
     "base_body",
-    "Identify the base body of ETS-VII, beside what the paper printed.",
+    "Identify the base body of ETS-VII, and compare with the results that the paper printed.",
     run=run,
     report=_report,
-    full="add what takes minutes",
+    full="add the parts that take minutes",
     seed=0,
 )

@@ -104,9 +104,9 @@ def precision_figure(result: BaseBody) -> Figure:
     axes = figure.subplots()
     looks = {
         "permitted, arm exact": (AFTER, "o", "at the permitted speed, arm exact"),
-        "permitted, arm 5 %": (AFTER, "s", "at the permitted speed, arm known to 5 %"),
+        "permitted, arm 5 %": (AFTER, "s", "at the permitted speed, arm uncertain by 5 %"),
         "faster, arm exact": (COLOURS[5], "^", f"{result.slowness:.1f} times faster, arm exact"),
-        "faster, arm 5 %": (COLOURS[5], "v", f"{result.slowness:.1f} times faster, arm known to 5 %"),
+        "faster, arm 5 %": (COLOURS[5], "v", f"{result.slowness:.1f} times faster, arm uncertain by 5 %"),
     }
     place = np.arange(len(LABELS))
     for shift, (name, values) in zip((-0.24, -0.08, 0.08, 0.24), result.precision.items(), strict=True):

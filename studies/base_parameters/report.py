@@ -134,40 +134,41 @@ def _report(result: Result) -> Report[Result]:
     planar, arm = result.planar.base, result.arm.base
     open_cases = sum(case.open_scale for case in result.scale)
     return Report(
-        title="What can be identified at all: base inertial parameters",
+        title="Identifiability: base inertial parameters",
         subtitle="Section 3.1 of Lampariello and Hirzinger (IDETC 2005)",
         question="Ten numbers describe the inertia of a rigid body. Which combinations of the robot's 10 (n + 1) "
-        "numbers do motion and joint torques show, and what gives the masses their scale, which motion alone leaves "
-        "open?",
-        answer=f"Motion and joint torques show {planar.count} sums of {len(planar.standard)} parameters with two "
-        f"joints and {arm.count} of {len(arm.standard)} for ETS-VII; motion alone leaves one more direction open, the "
-        "scale of all masses, which gravity gradient does not close and one known body, torque or thrust does.",
+        "numbers do motion and joint torques determine, and what fixes the scale of the masses, which motion alone "
+        "does not determine?",
+        answer=f"Motion and joint torques determine {arm.count} sums of the {len(arm.standard)} inertial parameters of "
+        f"ETS-VII, and {planar.count} of {len(planar.standard)} with two joints. Motion alone does not determine the "
+        "scale of all masses; the gravity gradient does not provide it either, but one known body, torque or thrust "
+        "does.",
         goals=goals_of(result),
         valid="bodies are rigid and joints ideal, without friction and rotors. How well a manoeuvre with noisy sensors "
-        "determines each sum is another question, that of the posterior.",
+        "determines each sum is a separate question, which the posterior answers.",
         full=True,
         figure=Picture(
             singular_figure(result),
             "Singular values of the regressor in random states with columns of unit length, relative to the largest: "
-            "those kept (blue) and those dropped (grey), which are rounding errors. The line is the threshold.",
+            "those retained (blue) and those dropped (grey), which are rounding errors. The line is the threshold.",
         ),
         setup=Setup(
-            robot="The shipped robot planar, a base of 60 kg and two links of about 5 kg that turn about z, in place "
+            robot="The example robot planar, a base of 60 kg and two links of about 5 kg that turn about z, in place "
             "of the paper's two-joint example, which has no numbers; and ETS-VII with six joints.",
-            manoeuvre="None: random states, joint angles anywhere on the circle, speeds and accelerations of unit "
-            "size, in which no wrench or a known one acts.",
-            sensors="None: the structure of the equations alone, without noise.",
+            manoeuvre="None: random states with joint angles anywhere on the circle, speeds and accelerations of unit "
+            "size, and either no wrench or a known one.",
+            sensors="None: only the structure of the equations matters, without noise.",
             known="Kinematics.",
             unknown="All inertial parameters.",
             replicates=f"Random states of seed {result.seed}. A rank is accepted only if Gram-Schmidt, pivoted QR and "
-            f"singular values agree with a threshold of 10⁻¹⁰. {len(result.scale)} kinds of data, {open_cases} of "
-            "which leave the scale open.",
+            f"singular values agree with a threshold of 10⁻¹⁰. {len(result.scale)} kinds of data; {open_cases} do not "
+            "determine the scale.",
         ),
         sections=[_negatives, _evidence],
         statements=_statements(result),
         tables=_tables(result),
-        beside="Beside this report: β of (24) for the two-joint robot ({0}), the sums of ETS-VII as formulas ({1}), "
-        "and the numbers of base parameters on a fixed base by bayesid, Pinocchio's rank and FIGAROH ({2}). "
+        beside="Tables with this report: β of (24) for the two-joint robot ({0}), the sums of ETS-VII as formulas "
+        "({1}), and the numbers of base parameters on a fixed base by bayesid, Pinocchio's rank and FIGAROH ({2}). "
         f"{LETTERS}",
     )
 
@@ -192,7 +193,7 @@ def goals_of(result: Result) -> list[Goal]:
     )
     return [
         Goal(
-            f"numbers of base parameters as by the paper's rules: {COUNTS[0]} and {COUNTS[1]}",
+            f"numbers of base parameters agree with the paper's rules: {COUNTS[0]} and {COUNTS[1]}",
             f"{counts[0]} and {counts[1]}",
             Verdict.of(counts == COUNTS),
         ),
@@ -222,19 +223,19 @@ def _negatives(document: Document, result: Result) -> None:
     links = [case.determined.gap[0] for case in _links(result)]
     document.items(
         [
-            "The dependent parameters K₂ (mass, first moment along the joint's axis and one moment of each link) "
-            f"follow from no data of motion and torques. K₂ that is {format_percent(WRONG - 1.0)} too large explains "
-            f"{STATES} exact states as well (torques differ by {format_number(recovery.torque_error, 1)} of the "
-            f"largest), with other values of K₁: {name} would be {format_number(wrong, 4)} and is "
-            f"{format_number(true, 4)}. {recovery.untouched} parameters of K₁ do not change.",
-            "Motion without torques leaves the scale of all masses open: multiplied by one number, they give the same "
-            "motion. The gravity gradient does not help, since its wrench is linear in the same parameters "
-            "(equivalence principle).",
-            "The mass of the base alone does not give the scale, because mass may be shifted from the base to the "
-            "first joint's axis; nor does a known load on an unknown link, because only the sum of both shows.",
-            "A light known body gives the scale weakly: the smallest singular value that is kept is "
-            f"{format_number(min(links), 1)} to {format_number(max(links), 1)} with one known link, where it is "
-            f"{format_number(_case(result, 'motion, base_link known').determined.gap[0], 1)} with the known base.",
+            "No data of motion and torques determine the dependent parameters K₂ (mass, first moment along the joint's "
+            f"axis and one moment of each link). K₂ that is {format_percent(WRONG - 1.0)} too large explains {STATES} "
+            f"exact states equally well (torques differ by {format_number(recovery.torque_error, 1)} of the largest), "
+            f"with different values of K₁: {name} would be {format_number(wrong, 4)} and is {format_number(true, 4)}. "
+            f"{recovery.untouched} parameters of K₁ do not change.",
+            "Motion without torques does not determine the scale of all masses: multiplied by a common factor, they "
+            "give the same motion. The gravity gradient does not help, since its wrench is linear in the same "
+            "parameters (equivalence principle).",
+            "The mass of the base alone does not fix the scale, because mass can be shifted from the base to the first "
+            "joint's axis; nor does a known load on an unknown link, because the data depend on the sum of both only.",
+            "A light known body fixes the scale only weakly: the smallest retained singular value is "
+            f"{format_number(min(links), 1)} to {format_number(max(links), 1)} with one known link, compared with "
+            f"{format_number(_case(result, 'motion, base_link known').determined.gap[0], 1)} with a known base.",
         ]
     )
 
@@ -274,7 +275,7 @@ def _evidence(document: Document, result: Result) -> None:
     robots = [("free", one) for one in (result.planar, result.arm)] + [("fixed", one) for one in result.grounded]
     add_number_table(
         document,
-        ["robot", "base", "standard", "base parameters", "dependent", "without effect", "last kept", "first dropped"],
+        ["robot", "base", "standard", "base parameters", "dependent", "no effect", "last retained", "first dropped"],
         [
             [
                 f"{one.robot.name}, {len(one.robot.joints)} joints",
@@ -292,10 +293,10 @@ def _evidence(document: Document, result: Result) -> None:
     )
     add_number_table(
         document,
-        ["measured or known", "scale", f"determined of {result.arm.base.count}", "last kept", "first dropped"],
+        ["measured or known", "scale", f"determined of {result.arm.base.count}", "last retained", "first dropped"],
         _scale_rows(result),
         "Base parameters of ETS-VII that different data determine, from the rank of the equations, and singular values "
-        "on both sides of it. Known parameters and actions weigh as much as one equation of motion.",
+        "on both sides of it. Each known parameter or action has the weight of one equation of motion.",
         words=2,
     )
 
@@ -340,15 +341,15 @@ def _statements(result: Result) -> list[Statement]:
             f"{planar.count} and, for ETS-VII, 70 − 18 = {arm.count}.",
         ),
         Statement(
-            "From the dependent parameters, the others follow once the base parameters are identified (24).",
+            "The other parameters follow from the dependent ones once the base parameters are identified (24).",
             Finding.CONFIRMED if result.recovery.standard_error < EXACT else Finding.REFUTED,
             f"To {format_number(result.recovery.standard_error, 1)}, from Pinocchio's torques.",
         ),
         Statement(
             "With a right side of (nearly) zero, (19) is badly posed (3).",
             Finding.CONFIRMED if alone.open_scale and gradient.open_scale else Finding.REFUTED,
-            "By exactly one direction, the scale, with gravity gradient too. In problems 1 and 2 the known arm or base "
-            "closes it.",
+            "In exactly one direction, the scale, even with the gravity gradient. In problems 1 and 2 the known arm or "
+            "base fixes it.",
         ),
     ]
 
@@ -361,7 +362,7 @@ def singular_figure(result: Result) -> Figure:
         values = np.maximum(one.singular, 1e-18)
         place = np.arange(1, len(values) + 1)
         count = one.base.count
-        axes.semilogy(place[:count], values[:count], ".", color=AFTER, label=f"{count} kept")
+        axes.semilogy(place[:count], values[:count], ".", color=AFTER, label=f"{count} retained")
         axes.semilogy(place[count:], values[count:], ".", color=TRUTH, label=f"{len(values) - count} dropped")
         axes.axhline(1e-10, color=TRUTH, linewidth=0.7)
         axes.set_title(f"{one.robot.name}, {len(one.robot.joints)} joints")
@@ -373,7 +374,7 @@ def singular_figure(result: Result) -> Figure:
 
 STUDY = Study(
     "base_parameters",
-    "Say which inertial parameters can be identified at all.",
+    "Determine which inertial parameters can be identified at all.",
     run=run,
     report=_report,
     seed=1,

@@ -226,7 +226,7 @@ class _World:
 PEER_STATES = 80  # number of random states, many more than the parameters need
 
 # statement in place of FIGAROH's version
-ABSENT = "is not evaluated, since it is not installed (the extra peers brings it)"
+ABSENT = "is not evaluated, because it is not installed (it comes with the extra peers)"
 
 
 @dataclass(frozen=True)

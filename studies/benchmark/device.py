@@ -111,18 +111,18 @@ def _shortest(function: Callable[[], object], repeats: int = REPEATS) -> float:
 def device_goals(measured: DeviceTimes | None) -> list[Goal]:
     """Return the goals of a device, not tested where there is none."""
     last = measured or DeviceTimes.read(LAST)
-    when = "" if measured else f" on the last one, {last.name}, {last.date}"
+    when = "" if measured else f", last measured on {last.name}, {last.date}"
     taken = "not measured" if last.identification is None else f"{last.identification:.2g} s"
     fast = measured and measured.simulations >= SIMULATIONS
     soon = measured and measured.identification is not None and measured.identification <= SECONDS
     return [
         Goal(
-            f"simulations of 120 s per second on a device: at least {SIMULATIONS:.0f}",
+            f"simulations of 120 s per second on an accelerator: at least {SIMULATIONS:.0f}",
             f"{format_number(last.simulations, 3)}{when}",
             Verdict.of(fast),
         ),
         Goal(
-            f"time of an identification to {SAMPLES:.0f} effective samples on a device, compiled: "
+            f"time of an identification to {SAMPLES:.0f} effective samples on an accelerator, compiled: "
             f"at most {SECONDS:g} s",
             f"{taken}{when}",
             Verdict.of(soon),
@@ -141,12 +141,12 @@ def add_device(document: Document, measured: DeviceTimes | None, evaluation: flo
     search : float or None; time of `search_seconds` on this machine's processor, None if not measured [s]
     """
     last = measured or DeviceTimes.read(LAST)
-    document.section("On another device")
+    document.section("Accelerator")
     if measured is None:
         document.paragraph(
-            f"This machine has none, so that nothing was tested here; the figures are those of an {last.name}, "
-            f"{last.date}. There, 65536 points in one call ran out of 80 GB. Calls are now as large as the memory of "
-            "the device allows: most of a point's are the tables of the composite body at all nodes and samples."
+            f"This machine has no accelerator, so nothing was tested here; the figures are those of an {last.name}, "
+            f"{last.date}. There, 65536 points in one call exceeded 80 GB. Calls are now sized to the memory of the "
+            "device; the tables of the composite body at all nodes and samples take most of it."
         )
     rows = [
         [str(batch), format_number(1e6 * seconds, 3), format_number(3.0 / seconds, 3)]
@@ -159,14 +159,14 @@ def add_device(document: Document, measured: DeviceTimes | None, evaluation: flo
         f"Points of three recordings of 120 s on {last.name}, and three of one recording on this machine.",
         columns("lrr"),
     )
-    absent = "not tested: no device here" if measured is None else "not measured"
+    absent = "not tested: no accelerator here" if measured is None else "not measured"
     document.table(
         ["search for manoeuvres", "time [s]"],
         [
             [f"{last.name}, {last.date}", absent if last.search is None else format_number(last.search, 3)],
             ["this machine's processor", "not measured" if search is None else format_number(search, 3)],
         ],
-        f"d-optimal manoeuvre of ETS-VII, 120 s, 48 free numbers: {STARTS} starts, at most {ITERATIONS} iterations "
-        "from each, compiled.",
+        f"d-optimal manoeuvre of ETS-VII, 120 s, 48 free numbers: {STARTS} starts, at most {ITERATIONS} iterations per "
+        "start, compiled.",
         columns("lr"),
     )

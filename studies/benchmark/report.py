@@ -99,30 +99,30 @@ def _report(result: Result) -> Report[Result]:
     return Report(
         title="Benchmark",
         subtitle="Cost of simulations and of effective samples",
-        question="What does one simulation cost beside other simulators at the same accuracy, how does that depend on "
-        "the problem, and what does an effective sample cost?",
-        answer=f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
-        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and {_spread(figures[1][1])} times "
-        "less than MuJoCo's rollouts in C.",
+        question="How much time does one simulation take compared with other simulators at the same accuracy, how does "
+        "that depend on the problem, and how much time does an effective sample take?",
+        answer=f"One evaluation takes {_spread(1e6 * evaluations)} µs, {_spread(figures[0][1])} times less than "
+        f"Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C. It is "
+        f"that of ETS-VII with {EVALUATED}.",
         goals=[*goals_of(figures), *device_goals(result.device)],
-        valid=f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
+        valid=f"run on {processor()}. Between runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
         full=result.full,
         figure=Picture(
             merit_figure(figures),
-            f"Every figure over its goal in {len(runs)} runs (dots: median; bars: smallest to largest). Right of the "
-            "line the goal is met; where less is better, the inverse is drawn.",
+            f"Every figure of merit over its goal in {len(runs)} runs (dots: median; bars: smallest to largest). To "
+            "the right of the line the goal is met; where less is better, the inverse is drawn.",
         ),
         setup=Setup(
             robot="ETS-VII; chains of 6 to 60 links that cut one arm into equal parts.",
-            manoeuvre="A random manoeuvre of all joints of 120 s. No rule of the flight is applied: only times count.",
+            manoeuvre="A random manoeuvre of all joints for 120 s. No flight rule is applied: only times count.",
             sensors="Rate and accelerometer at 2 Hz, 10⁻⁵ rad/s and 10⁻⁵ m/s²; encoders exact, or with noise.",
             known="Arm and orbit. MuJoCo's joints are driven by the exact torques at mid-step, its best case; it "
             "simulates without the gravity gradient.",
             unknown=f"Base and initial rate; three recordings and {runs[0].sampling.chains.z.shape[-1]} unknowns where "
             "samples are drawn.",
-            replicates=f"{len(runs)} runs of all of it, one after the other; within a run the shortest of several "
-            "times counts, after one that is not counted.",
+            replicates=f"{len(runs)} complete runs, one after the other; within a run the shortest of several times "
+            "counts, after a first call that is discarded.",
         ),
         sections=[_simulations, _samples, _device],
         tables=[CsvTable("runs", ["run", "figure of merit", "value"], rows)],
@@ -162,9 +162,9 @@ def _simulations(document: Document, result: Result) -> None:
     document.table(
         ["simulator or case", "time [µs]", "ratio"],
         rows,
-        f"Median of {len(runs)} runs (smallest to largest). Ratios: of other simulators to one evaluation of the log "
-        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other simulators "
-        "take steps short enough for an error below 0.01 σ, where they reach it.",
+        f"Median of {len(runs)} runs (smallest to largest). Ratios: other simulators over one evaluation of the log "
+        f"likelihood, that of ETS-VII with {EVALUATED}; cases over the first with the same unit. The steps of other "
+        "simulators are short enough for an error below 0.01 σ, where they can reach it.",
         columns("lrr"),
     )
 
@@ -182,13 +182,13 @@ def _samples(document: Document, result: Result) -> None:
             ),
         ]
     lengths = min(run.sampling.default_lengths for run in runs)
-    doubt = "" if lengths >= ENOUGH else ", too few to be sure of it, so that its cost is a lower bound"
+    doubt = "" if lengths >= ENOUGH else ", too few for a reliable estimate, so its cost is a lower bound"
     document.table(
         ["run", "moves", "evaluations", "effective samples", "evaluations per sample", "time per sample [ms]"],
         rows,
-        "Cost of an effective sample, burn-in included: by the package's moves (Laplace-t independence and "
-        f"differential evolution) and by emcee's default stretch move, whose chain covers {lengths:.0f} "
-        f"autocorrelation times or more{doubt}. The package's time is that of the whole identification, with mode and "
+        "Cost of an effective sample, including burn-in: with the package's moves (Laplace-t independence and "
+        f"differential evolution) and with emcee's default stretch move, whose chain covers at least {lengths:.0f} "
+        f"autocorrelation times{doubt}. The package's time is that of the whole identification, with mode and "
         "evidence.",
         columns("rlrrrr"),
     )

@@ -61,17 +61,22 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     flown = in_basilisk(trials)
     return [
         _rate("false alarms where nothing is hidden", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
-        _least("verdicts of 0.9 and more that name nothing false", 0.93, sum(t.holds for t in sure), len(sure)),
-        _relative(f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit", 0.97, limited),
+        _least("verdicts with 0.9 or more that name no false cause", 0.93, sum(t.holds for t in sure), len(sure)),
+        _relative(f"named alone at {CLEAR:g} sigma or more, relative to the simulated limit", 0.97, limited),
         _least(f"hidden causes in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
         _least(
-            f"outside effects with {LEFT:g} sigma left called unknown",
+            f"outside effects with a residual of {LEFT:g} sigma or more reported as unknown",
             0.95,
             sum(t.status == "unknown" for t in left),
             len(left),
         ),
-        _most(f"outside effects with {LEFT:g} sigma left misnamed", 0.03, sum(t.misnamed for t in left), len(left)),
-        _stated(f"outside effects with less than {LEFT:g} sigma left wrongly explained", barely_left(trials)),
+        _most(
+            f"outside effects with a residual of {LEFT:g} sigma or more misnamed",
+            0.03,
+            sum(t.misnamed for t in left),
+            len(left),
+        ),
+        _stated(f"outside effects with a residual below {LEFT:g} sigma wrongly explained", barely_left(trials)),
         *(_correlation(name, least, cases, trials) for name, (least, cases) in TORQUES.items()),
         _coverage([t.amplitude_errors for t in trials if t.named_rightly and t.amplitude_errors]),
         _scatter("amplitudes", amplitudes),
@@ -134,7 +139,7 @@ def _scatter(text: str, errors: np.ndarray) -> Goal:
 
 def _stated(text: str, trials: Sequence[Trial]) -> Goal:
     """Return the goal that wrong explanations are no more frequent than the explanations' mean stated error, 1 - p."""
-    text = f"{text}: no more often than their stated probabilities of error say"
+    text = f"{text}: no more often than their stated probabilities of error"
     if not trials:
         return Goal(text, "none", Verdict.NOT_TESTED)
     share = Share(sum(map(wrongly_explained, trials)), len(trials))
@@ -164,7 +169,7 @@ def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence
 def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     """Return the goal on 95 % intervals of amplitudes; errors of one trial are not taken as independent."""
     least, most = COVERAGE
-    text = f"95 % intervals of amplitudes hold the truth: {100.0 * least:g} to {100.0 * most:g} %"
+    text = f"95 % intervals of amplitudes contain the truth: {100.0 * least:g} to {100.0 * most:g} %"
     if len(trials) < 2:
         return Goal(text, "-", Verdict.NOT_TESTED)
     covered = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])

@@ -51,7 +51,7 @@ def run(
     plans = plan(full)
     done = read(trials) if made else make_trials(plans, trials, progress, workers)
     if not done:
-        raise ValueError(f"{trials} holds no trials; leave out --made to make some")
+        raise ValueError(f"{trials} contains no trials; omit --made to make some")
     if record is not None:
         write_json(record, goals.record_of(done))
     return Campaign(done, len(plans))
@@ -65,43 +65,43 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     verdicts = [goal.verdict for goal in judged]
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     answer = (
-        f"Of the verdicts with a probability of {SURE:g} or more {share_text(right, len(sure))} name nothing false; "
-        f"where nothing is hidden {share_text(alarmed, len(nulls))} trials raised an alarm"
+        f"{share_text(right, len(sure))} verdicts with a probability of {SURE:g} or more name no false cause. With "
+        f"nothing hidden, {share_text(alarmed, len(nulls))} trials raised an alarm"
     )
     if any(goal.verdict is Verdict.FAIL and "wrongly explained" in goal.text for goal in judged):
         answer += f"; {_explained_outside(trials)[0]}"
     if len(trials) < planned:
         answer += (
-            f"; {len(trials):,} of {planned:,} planned trials leave {verdicts.count(Verdict.OPEN)} of {len(judged)} "
-            "goals undecided"
+            f"; with {len(trials):,} of {planned:,} planned trials {verdicts.count(Verdict.OPEN)} of {len(judged)} "
+            "goals are undecided"
         )
     seconds = np.median([trial.seconds["total"] for trial in trials])
     return Report(
         title="Blind injections",
-        subtitle="What the diagnosis says of hidden causes",
-        question="How often does the diagnosis name a hidden cause, rightly or wrongly, and how often does it raise an "
-        "alarm where nothing is hidden?",
+        subtitle="Verdicts of the diagnosis on hidden causes",
+        question="How often does the diagnosis name a hidden cause, correctly or wrongly, and how often does it raise "
+        "an alarm with nothing hidden?",
         answer=f"{answer}.",
         goals=judged,
-        valid="a base carries an arm of three to five joints whose links are exact or known to 2 %, and noise is white "
-        "and as declared where its fault is not what is hidden.",
+        valid="a base carries an arm of three to five joints whose links are exact or have a relative uncertainty of "
+        "2 %, and noise is white and as declared unless a noise fault is hidden.",
         full=len(trials) >= planned,
         figure=Picture(
             _figure([trial for trial in trials if trial.kind == "effect"]),
-            "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: what was said. Faults that "
-            "only change the noise have no such ratio and are not shown.",
+            "Outcomes of the trials with a hidden cause of the catalogue, by its signal-to-noise ratio. Faults that "
+            "only change the noise have no such ratio and are omitted.",
         ),
-        note="Brackets hold exact 95 % intervals: of shares those of Clopper and Pearson, of medians those of order "
-        "statistics. NOT DECIDED: the interval has values on both sides of the goal, because too few trials were made. "
-        "Sigma of a cause: the root of the noncentrality of its signal after the model's unknowns have taken their "
-        "share. Sigma left: the same of what the most probable set of known causes leaves of an outside effect; it is "
-        "the size of what could still tell that the named causes are not the true ones.",
+        note="Brackets contain exact 95 % intervals: Clopper and Pearson for shares, order statistics for medians. NOT "
+        "DECIDED: the interval has values on both sides of the goal, because too few trials were made. Sigma of a "
+        "cause: the root of the noncentrality of its signal without the part that the model's unknowns absorb. "
+        "Residual of an outside effect: the same for the part of it that the most probable set of known causes does "
+        "not absorb either; only this part could reveal that the named causes are not the true ones.",
         setup=_setup(trials, planned),
         sections=[_failures, _evidence, _calibration, _answers],
         tables=_tables(trials),
-        beside="Beside this report: every trial with its seed and strength ({0}), the answers by case in words ({1}) "
-        f"and as a matrix of counts ({{2}}), and Brier and logarithmic scores ({{3}}). A trial took {seconds:.0f} s in "
-        "the median.",
+        beside="Tables with this report: every trial with its seed and strength ({0}), the answers by case in words "
+        f"({{1}}) and as a matrix of counts ({{2}}), and Brier and logarithmic scores ({{3}}). The median time of a "
+        f"trial was {seconds:.0f} s.",
     )
 
 
@@ -109,20 +109,22 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     counts = [sum(trial.kind == kind for trial in trials) for kind in ("effect", "unknown", "adequate")]
     seeds = [trial.seed for trial in trials]
     return Setup(
-        robot="Three robots of three to five joints, one with slides and branches, in MuJoCo: bodies, springs, fields "
-        f"and sensor faults, without any code of the package. In {len(goals.in_basilisk(trials))} trials two of them "
-        "fly in Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is "
-        "hidden.",
+        robot="Three robots of three to five joints, one with prismatic joints and branches, in MuJoCo: bodies, "
+        "springs, fields and sensor faults, without any code of the package. In "
+        f"{len(goals.in_basilisk(trials))} trials two of them fly in Basilisk, where a soft servo drives the joints; "
+        "hidden are Basilisk's models of a wheel, leak, slosh or panel, or nothing.",
         manoeuvre="Three recordings of 120 to 170 s each; a single one in some trials.",
         sensors=f"At 2 Hz, noise per sample: rate {format_number(1e-5)} rad/s, accelerometer {format_number(1e-5)} "
         f"m/s², encoders {format_number(1e-6)} rad.",
-        known="Robot, orbit, sensors and attitude at the start, as the files state them; links exactly or to 2 %.",
-        unknown="The base's ten parameters, the initial rates, and what is hidden. The diagnosis gets the files alone.",
-        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]} with causes of the "
-        f"catalogue hidden, {counts[1]} with something outside it, {counts[2]} with nothing. Seeds {min(seeds)} to "
-        f"{max(seeds)}, other than those of tests. Trials of the full plan were made over several versions of the "
-        "package as the campaign went on: defects that it found were mended meanwhile, and the trials made before were "
-        "kept. Which version made a trial is not kept with it.",
+        known="Robot, orbit, sensors and attitude at the start, as the files state them; links exactly or with a "
+        "relative uncertainty of 2 %.",
+        unknown="The base's ten parameters, the initial rates, and the hidden cause. The diagnosis reads only the "
+        "files.",
+        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]} with hidden causes of "
+        f"the catalogue, {counts[1]} with a cause outside it, {counts[2]} with nothing hidden. Seeds {min(seeds)} to "
+        f"{max(seeds)}, different from those of the tests. The trials of the full plan were made with several versions "
+        "of the package: defects that the campaign revealed were fixed while it ran, and earlier trials were retained. "
+        "The version that made a trial is not recorded.",
     )
 
 
@@ -135,8 +137,8 @@ def _explained_outside(trials: Sequence[Trial]) -> tuple[str, str]:
     stated = [trial.probability for trial in wrong if trial.probability is not None]
     sure = f", with stated probabilities of {min(stated):.3f} to {max(stated):.3f}" if stated else ""
     return (
-        f"of the effects outside the catalogue that leave less than {LEFT:g} sigma {share_text(len(wrong), len(near))} "
-        f"were wrongly explained: {named}",
+        f"{share_text(len(wrong), len(near))} effects outside the catalogue with a residual below {LEFT:g} sigma were "
+        f"wrongly explained: {named}",
         sure,
     )
 
@@ -154,14 +156,14 @@ def _failure(alike: Sequence[Trial]) -> str:
         each.append(", ".join(parts))
     if first.kind == "adequate":
         return (
-            f"Nothing was hidden ({first.case.removeprefix('null, ')}), and the verdict was {said}: {'; '.join(each)}."
+            f"Nothing was hidden ({first.case.removeprefix('null, ')}), but the verdict was {said}: {'; '.join(each)}."
         )
     where = ", outside the catalogue," if first.kind == "unknown" else ""
-    return f"{first.case.replace(', ', ' + ')}{where} was called {said}: {'; '.join(each)}."
+    return f"{first.case.replace(', ', ' + ')}{where} was reported as {said}: {'; '.join(each)}."
 
 
 def _failures(document: Document, campaign: Campaign) -> None:
-    document.section("What went wrong")
+    document.section("Failures")
     trials = campaign.trials
     wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]
     alike: dict[tuple[str, str], list[Trial]] = {}
@@ -172,29 +174,27 @@ def _failures(document: Document, campaign: Campaign) -> None:
         said, sure = _explained_outside(trials)
         texts.insert(0, f"{said[0].upper()}{said[1:]}{sure}.")
     if not wrong:
-        texts.append("No trial was misnamed, and none without anything hidden raised an alarm.")
+        texts.append("No trial was misnamed, and no trial with nothing hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]
     if missed:
         counts = Counter(map(_hidden, missed))
         named = joined([case if count == 1 else f"{case} ({count})" for case, count in sorted(counts.items())])
         largest = max(trial.signal_to_noise or 0.0 for trial in missed)
-        texts.append(f"No alarm was raised by {named}; the largest of them has {largest:.1f} σ.")
+        texts.append(f"No alarm was raised for {named}; the largest of these effects has {largest:.1f} σ.")
     framed = [t for t in trials if t.kind == "unknown" and t.true_frame is not None and t.status == "unknown"]
     if framed:
         right = sum(t.frame == t.true_frame for t in framed)
         wrongly = sum(t.frame not in (None, t.true_frame) for t in framed)
         median = np.median([trial.correlation or 0.0 for trial in framed])
         texts.append(
-            f"Axes in which an outside torque is fixed: {share_text(right, len(framed))} named rightly, {wrongly} "
-            f"wrongly. The torque reconstructed correlates with the true one by {median:.2f} in the median, "
-            f"{min(trial.correlation or 0.0 for trial in framed):.2f} in the worst case."
+            f"Axes in which an outside torque is fixed: {share_text(right, len(framed))} named correctly, {wrongly} "
+            f"wrongly. The correlation of the reconstructed torque with the true one has a median of {median:.2f} and "
+            f"is {min(trial.correlation or 0.0 for trial in framed):.2f} in the worst case."
         )
     texts += _snaps(trials)
     outside = [trial for trial in wrong if trial.kind == "unknown"]
     if outside and all((trial.signal_to_noise or 0.0) < LEFT for trial in outside):
-        texts.append(
-            f"Every outside effect that was misnamed left less than {LEFT:g} σ beside the causes it was taken for."
-        )
+        texts.append(f"Every misnamed outside effect has a residual below {LEFT:g} σ with the causes that were named.")
     document.items(texts)
 
 
@@ -214,13 +214,13 @@ def _snaps(trials: Sequence[Trial]) -> list[str]:
         limits.append([rows.snap_limit(size, rng) for _ in range(SNAPS)])
     low, median, high = np.quantile(limits, [0.1, 0.5, 0.9])
     least = TORQUES["snaps and pulses"][0]
-    beyond = f": the goal of {least:g} lies beyond what rates tell" if high < least else ""
+    beyond = f": rates alone cannot meet the goal of {least:g}" if high < least else ""
     return [
-        f"Of {len(snaps)} snaps of {min(sizes):.1f} to {max(sizes):.1f} σ the torque reconstructed correlates with the "
-        f"true one by {np.median(reached):.2f} in the median. On rates alone, a reader who knows that each recording "
-        "holds one torque that sets in at once and dies away, but neither when, how fast, along which axis nor how "
-        f"large, would reach {median:.2f} ({low:.2f} to {high:.2f} in eight of ten draws) at the same sizes, simulated "
-        f"on a free body{beyond}."
+        f"For {len(snaps)} snaps of {min(sizes):.1f} to {max(sizes):.1f} σ the correlation of the reconstructed torque "
+        f"with the true one has a median of {np.median(reached):.2f}. From rates alone, an estimator that knows that "
+        "each recording contains one torque with a sudden onset and a decay, but not its time, decay, axis or size, "
+        f"would reach {median:.2f} ({low:.2f} to {high:.2f} in eight of ten draws) at the same sizes, simulated on a "
+        f"free body{beyond}."
     ]
 
 
@@ -234,36 +234,36 @@ def _said(trial: Trial) -> str:
 
 
 def _evidence(document: Document, campaign: Campaign) -> None:
-    document.section("What was said, by the size of what was hidden")
+    document.section("Verdicts by size of the hidden cause")
     add_number_table(
         document,
         ["signal-to-noise", "trials", "alarm", "limit", "in the set", "named alone", "limit", "misnamed"],
         rows.rates(campaign.trials),
-        "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: the root of its noncentrality "
-        "after the model's unknowns have taken their share. The limits are the numbers expected of a test that knows "
-        "which effect to look for (family-wise 1 %), and of the Bayes decision between all sets of causes on data of "
-        f"the linear model, simulated {DRAWS} times for each trial. In the set: the hidden causes are among the "
-        "explanations reported. Misnamed: something is named and the hidden causes are in no explanation.",
+        "Trials with a hidden cause of the catalogue, by its signal-to-noise ratio: the root of its noncentrality "
+        "without the part that the model's unknowns absorb. The limits are the numbers expected from a test that knows "
+        "which effect to look for (family-wise 1 %), and from the Bayes decision between all sets of causes on data of "
+        f"the linear model, simulated {DRAWS} times per trial. In the set: the hidden causes are among the reported "
+        "explanations. Misnamed: causes are named, and the hidden ones are in no explanation.",
     )
 
 
 def _calibration(document: Document, campaign: Campaign) -> None:
     trials = campaign.trials
-    document.section("Whether stated probabilities and intervals hold")
+    document.section("Calibration of stated probabilities and intervals")
     stated = rows.reliability(trials)
     if stated:
         add_number_table(
             document,
-            ["stated probability", "trials", "mean stated", "right", "share right", "95 % interval"],
+            ["stated probability", "trials", "mean stated", "correct", "share correct", "95 % interval"],
             stated,
-            "Trials whose verdict names causes, by the probability stated for the named causes together. Right: every "
-            "named cause is hidden. Intervals are Wilson's. The trials hide causes as planned and not as often, nor as "
-            "large, as the prior of the diagnosis says, so that stated and found shares need not agree exactly.",
+            "Trials whose verdict names causes, by the probability stated for the named causes together. Correct: "
+            "every named cause is hidden. Intervals are Wilson's. Frequency and size of the hidden causes follow the "
+            "plan and not the prior of the diagnosis, so stated and observed shares need not agree exactly.",
         )
         document.figure(
             rows.reliability_figure(trials),
-            "Share of verdicts whose named causes are all hidden, against the probability stated, with 95 % intervals "
-            "(Wilson). The grey line is where both agree.",
+            "Share of verdicts whose named causes are all hidden, against the stated probability, with 95 % intervals "
+            "(Wilson). On the grey line both agree.",
         )
     else:
         document.paragraph("No trial has named a cause.")
@@ -271,8 +271,8 @@ def _calibration(document: Document, campaign: Campaign) -> None:
         document,
         ["errors in stated sd", "numbers", "mean", "rms", "within 1 sd", "within 2 sd"],
         rows.errors(trials),
-        "Errors of what is reported in the standard deviations stated; ideal are mean 0, rms 1, 68 % and 95 %. The ten "
-        "parameters of a base are correlated.",
+        "Errors of the reported values in their stated standard deviations; ideal are mean 0, rms 1, 68 % and 95 %. "
+        "The ten parameters of a base are correlated.",
     )
 
 
@@ -283,24 +283,24 @@ def _answers(document: Document, campaign: Campaign) -> None:
         document,
         SCORES,
         [[row[0], *(cell.replace("-", "−") for cell in row[1:])] for row in rows.scores(trials)],
-        "Scores of the stated probabilities with standard errors, over the trials: of each cause stated above 1 %, of "
-        "something outside the catalogue, and of nothing.",
+        "Scores of the stated probabilities with standard errors, over the trials: for each cause stated above 1 %, "
+        "for a cause outside the catalogue, and for nothing.",
     )
     amiss = Counter(trial.case for trial in trials if not _answered(trial))
     mixed = {case for case, count in amiss.items() if count >= SHOWN}
     others = len({trial.case for trial in trials} - mixed)
-    document.section("What was said of what was hidden")
+    document.section("Answers by hidden cause")
     if mixed:
         add_number_table(
             document,
-            ["hidden", "said, with the number of trials"],
+            ["hidden", "answers, with the number of trials"],
             sorted(rows.confusion([trial for trial in trials if trial.case in mixed])),
-            f"Answers of the {len(mixed)} cases of which at least {SHOWN} trials were not answered rightly, all "
-            f"strengths together. Those of the {others} other cases are in blind_injections-answers.csv.",
+            f"Answers for the {len(mixed)} cases with at least {SHOWN} trials that were not answered correctly, all "
+            f"strengths together. Those for the {others} other cases are in blind_injections-answers.csv.",
             words=2,
         )
     else:
-        document.paragraph(f"All {others} cases were answered rightly in every trial but at most {SHOWN - 1}.")
+        document.paragraph(f"In each of the {others} cases at most {SHOWN - 1} trial was not answered correctly.")
 
 
 def _answered(trial: Trial) -> bool:
@@ -353,7 +353,7 @@ def _figure(injected: Sequence[Trial]) -> Figure:
     axes.set_xscale("log")
     axes.set_xticks(TICKS, [str(tick) for tick in TICKS])
     axes.minorticks_off()
-    axes.set_xlabel("signal-to-noise ratio of what is hidden")
+    axes.set_xlabel("signal-to-noise ratio of the hidden cause")
     return figure
 
 
@@ -369,14 +369,14 @@ def _outcome(trial: Trial) -> str:
 
 STUDY = Study(
     "blind_injections",
-    "How often a hidden cause is named rightly or wrongly, and how often nothing raises alarm.",
+    "Count how often a hidden cause is named correctly or wrongly, and how often nothing hidden raises an alarm.",
     run=run,
     report=_report,
-    full="hundreds of injections and a thousand nulls (many hours)",
+    full="hundreds of hidden causes and a thousand trials with nothing hidden (many hours)",
     extra={
-        "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
+        "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "file of the trials"},
         **MADE,
-        "--record": {"type": Path, "help": "file for the counts that the package ships"},
+        "--record": {"type": Path, "help": "file for the counts that come with the package"},
         **WORKERS,
     },
     inputs=lambda options: [options.trials],

@@ -31,7 +31,7 @@ def rates(trials: Sequence[Trial]) -> list[list[str]]:
         if within:
             rows.append([f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}", *_row(within)])
     spoilt = [trial for trial in injected if trial.signal_to_noise is None]
-    return [*rows, ["faults of the noise", *_row(spoilt)]] if spoilt else rows
+    return [*rows, ["noise faults", *_row(spoilt)]] if spoilt else rows
 
 
 def _row(trials: Sequence[Trial]) -> list[str]:
@@ -129,7 +129,7 @@ def errors(trials: Sequence[Trial]) -> list[list[str]]:
     right = [trial for trial in trials if trial.kind == "effect" and trial.named_rightly]
     quiet = [trial for trial in trials if trial.kind == "adequate"]
     return [
-        _scattered("amplitudes of causes named rightly", [error for t in right for error in t.amplitude_errors]),
+        _scattered("amplitudes of correctly named causes", [error for t in right for error in t.amplitude_errors]),
         _scattered("base, after the extension", [error for t in right for error in t.body_errors]),
         _scattered("base, nothing hidden", [error for t in quiet for error in t.body_errors]),
     ]
@@ -154,7 +154,7 @@ def reliability_figure(trials: Iterable[Trial]) -> Figure:
         interval = stats.binomtest(right, len(pairs)).proportion_ci(method="wilson")
         axes.plot([stated, stated], [interval.low, interval.high], color=AFTER, linewidth=1.0)
         axes.plot(stated, right / len(pairs), "o", color=AFTER, markersize=4)
-    axes.set(xlim=(0.0, 1.02), ylim=(-0.03, 1.03), xlabel="stated probability", ylabel="share right")
+    axes.set(xlim=(0.0, 1.02), ylim=(-0.03, 1.03), xlabel="stated probability", ylabel="share correct")
     return figure
 
 

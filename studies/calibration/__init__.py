@@ -1,4 +1,4 @@
-"""Calibration: whether the truth lies as often within the stated intervals as they say, through the whole chain.
+"""Calibration: whether stated intervals contain the truth as often as they state, through the whole chain.
 
 Every replicate draws the unknowns from the prior, records a manoeuvre with all noise, and identifies it as a user
 would; the ranks of the truth among draws of the posterior must be uniform (simulation-based calibration). Some cases

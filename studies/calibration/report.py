@@ -77,7 +77,7 @@ def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     )
     goals = []
     for level in LEVELS:
-        text = f"{format_percent(level)} intervals hold that share of truths in every case"
+        text = f"{format_percent(level)} intervals contain that share of the true values in every case"
         mine = [key for key in coverages if key[1] == level]
         if not mine:
             goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
@@ -134,26 +134,26 @@ def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
     said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
     return Report(
         title="Calibration",
-        subtitle="Whether the truth lies where the posterior says",
-        question="Does the truth lie within the stated intervals as often as they say, through the whole chain?",
-        answer=f"Of the bodies' true values {_percent(share, error)} % lie within their {format_percent(LEVELS[-1])} "
-        f"intervals and {said}, over {made:,} replicates"
-        + (f" of the {planned:,} that would decide." if made < planned else "."),
+        subtitle="Coverage of the posterior's intervals",
+        question="Does the truth lie within the stated intervals as often as stated, through the whole chain?",
+        answer=f"{_percent(share, error)} % of the bodies' true values lie within their {format_percent(LEVELS[-1])} "
+        f"intervals, and {said}, over {made:,} replicates"
+        + (f" of the {planned:,} needed for a decision." if made < planned else "."),
         goals=goals_of(cases),
-        valid="noise is white and as declared, joints move smoothly, nothing acts that the model lacks, and the prior "
-        "is the one from which truths are drawn.",
+        valid="noise is white and as declared, joints move smoothly, the model lacks no effect, and the truths are "
+        "drawn from the prior.",
         full=made >= planned,
         figure=Picture(
             ecdf_figure(cases, len(corrected)),
-            "Empirical distribution of the ranks less the uniform one, by importance sampling: every unknown (grey), "
-            "the log likelihood (colour), and the band that all curves of all cases leave with a probability of at "
+            "Empirical distribution of the ranks minus the uniform one, by importance sampling: every unknown (grey), "
+            "the log likelihood (colour), and the band that any curve of any case exceeds with a probability of at "
             f"most {format_percent(FAMILYWISE, 1)}.",
         ),
         note=f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and "
-        f"corrected by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage are by the "
-        "standard error over replicates, whose numbers depend on one another, and corrected by Holm's method over all "
-        f"cases, all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, "
-        "and is not decided until all its replicates are made.",
+        f"corrected by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage use the "
+        "standard error over replicates, since the numbers of a replicate are dependent, and are corrected by Holm's "
+        f"method over each case, all cases together and {len(LEVELS)} levels. A goal fails at "
+        f"{format_percent(FAMILYWISE, 1)} family-wise, and is not decided until all its replicates are made.",
         setup=_setup(cases),
         outline=robot_outline(ets7(), START),
         sections=[_failures, _findings, _chi_square],
@@ -171,12 +171,12 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
         "m/s², joint positions with 10⁻⁶ rad.",
         known="The orbit with its gravity gradient, the attitude at the start, the sensors' noise.",
         unknown=f"Log-Cholesky coordinates of width {BASE_SPREAD:g} for base and load (mass uncertain by a factor of "
-        f"1.8), {ARM_SPREAD:g} for an arm known to 5 %, {DRAWINGS_SPREAD:g} for links where the whole system is "
-        "unknown; the initial rate, as it belongs to the joints as smoothed.",
-        replicates="Each draws the unknowns from the prior, records with all noise, smooths the joints, finds the "
+        f"1.8), {ARM_SPREAD:g} for an arm with masses uncertain by 5 % (1 sigma), {DRAWINGS_SPREAD:g} for links where "
+        "the whole system is unknown; the initial rate that matches the smoothed joints.",
+        replicates="Each draws the unknowns from the prior, records with all noise, smooths the joints, computes the "
         "mode, and ranks the truth among draws of the posterior. Around one data set, truths are drawn from its "
         "posterior and each replicate's posterior is that of both data sets. Data of cases named MuJoCo share no code "
-        f"with the package. Median processor time of a replicate {seconds:.1f} s. Method: Talts et al. 2018; "
+        f"with the package. Median processor time of a replicate: {seconds:.1f} s. Method: Talts et al. 2018; "
         "Säilynoja, Bürkner and Vehtari 2022 (bands); Modrák et al. 2023.",
     )
 
@@ -186,66 +186,65 @@ def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
     smoothed = smoothed_errors()
     sharp = np.sqrt([row.near[2] for row in smoothed])
     document.paragraph(
-        "Chi-square is that of the data at the truth, so that its mean is one where the stated covariance is right. It "
-        "is below one where the noise carried from the encoders is overstated, above one where understated. The second "
-        "table, of joint motions that are known exactly, says why it may be either. The smoothing takes a motion as a "
-        "five-fold integral of white noise, the smoothest that its algebra allows. Robots move smoother than that: of "
-        "the stated variance of position, speed and acceleration the shares "
+        "Chi-square is that of the data at the truth, so its mean is one if the stated covariance is right. It is "
+        "below one if the noise propagated from the encoders is overstated, above one if it is understated. The second "
+        "table, for exactly known joint motions, explains why both occur. The smoothing models a motion as a five-fold "
+        "integral of white noise, the smoothest that its algebra allows. Real robot motions are smoother: of the "
+        "stated variance of position, speed and acceleration the shares "
         f"{', '.join(f'{1.0 - smooth_share(order):.1f}' for order in range(3))} are roughness that such motions do not "
-        "have, whatever the sampling and the encoder, as long as the encoder's noise and not the interval limits the "
-        f"smoothing. Ratios of {', '.join(f'{smooth_share(order):.1f}' for order in range(3))} follow, and a sensor "
-        "whose errors are mostly carried accelerations shows a chi-square down to one half. Within a second of the "
-        f"ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is {sharp.min():.1f} to "
-        f"{sharp.max():.1f} times what is stated: jumps that the samples show are unknowns of the process, but one "
-        "joint alone, as here, does not show all. A sensor with as much noise of its own shows little of either."
+        "have, whatever the sampling and the encoder, provided that the encoder's noise and not the interval limits "
+        f"the smoothing. The resulting ratios are {', '.join(f'{smooth_share(order):.1f}' for order in range(3))}, and "
+        "the chi-square of a sensor whose errors are mostly propagated accelerations can fall to one half. Within a "
+        f"second of the ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is "
+        f"{sharp.min():.1f} to {sharp.max():.1f} times the stated one: jumps that the samples reveal are unknowns of "
+        "the process, but a single joint, as here, does not reveal all of them. Both effects are small in a sensor "
+        "whose noise is as large as the propagated one."
     )
     add_number_table(
         document,
         ["case", "rate", "accelerometer"],
         [[runs.case, *(_mean(runs.chi2(sensor)) for sensor in ("rate", "accel"))] for runs in cases if runs.results],
-        "Mean chi-square per sample at the truth, with its standard error over replicates. Around one data set, half "
-        "of the samples are the same in all replicates, and their mean need not be one.",
+        "Mean chi-square per sample at the truth, with its standard error over replicates. In the case around one data "
+        "set, half of the samples are the same in all replicates, and their mean need not be one.",
     )
     parts = [f"{part}, {name}" for part in ("between", "near") for name in ("pos.", "speed", "accel.")]
     add_number_table(
         document,
         ["sampling, encoder", *parts],
         [_smoothed_row(row) for row in smoothed],
-        "Mean square of the errors of smoothed joints over the stated variance, one where all is right: near the ends "
-        f"of ramps (within {NEAR:g} s) and between.",
+        "Mean square of the errors of smoothed joints over the stated variance, ideally one: near the ends of ramps "
+        f"(within {NEAR:g} s) and between them.",
     )
 
 
 def _findings(document: Document, cases: Sequence[Replicates]) -> None:
-    document.section("What the ranks and intervals say")
+    document.section("Ranks and intervals")
     corrected = corrected_p_values(cases)
     wrong = [f"{name} ({case}; p {format_p_value(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE]
     sentences = [
         f"Not uniform at {100.0 * FAMILYWISE:g} % family-wise: " + "; ".join(wrong) + "."
         if wrong
-        else f"None of {len(corrected)} ranks contradicts uniformity at {100.0 * FAMILYWISE:g} % family-wise. Where "
-        "replicates are few that is weak evidence: see the width of the bands."
+        else f"None of {len(corrected)} ranks contradicts uniformity at {100.0 * FAMILYWISE:g} % family-wise. With few "
+        "replicates this is weak evidence: see the width of the bands."
     ]
-    for title, chosen in (("the package's own data", False), ("data made by MuJoCo", True)):
+    for title, chosen in (("data generated by the package", False), ("data generated by MuJoCo", True)):
         ranks = [runs.bodies() for runs in cases if (runs.case in INDEPENDENT) is chosen and len(runs.results)]
         if ranks:
             shares = [pooled_coverage(ranks, level) for level in LEVELS]
             words = ", ".join(_percent(*share) for share in shares)
             sentences.append(
-                f"On {title}, {words} % (with standard errors) of the bodies' true values lie within the "
+                f"For {title}, {words} % (with standard errors) of the bodies' true values lie within the "
                 f"{', '.join(f'{100.0 * level:g}' for level in LEVELS)} % intervals."
             )
     pooled = np.concatenate([runs.ranks()[LOG_LIKELIHOOD] for runs in cases if runs.results])
     p_value = format_p_value(replicate.uniform_p_value(pooled))
-    sentences.append(
-        f"The log likelihood of all {len(pooled)} replicates together: p = {p_value} of its ranks being uniform."
-    )
+    sentences.append(f"Log likelihood of all {len(pooled)} replicates together: p = {p_value} for uniform ranks.")
     chi2 = [np.concatenate([runs.chi2(sensor) for runs in cases if runs.results]) for sensor in ("rate", "accel")]
     sentences.append(
-        f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, but "
-        "not by merit alone: the noise carried from the encoders is overstated where joints move smoothly and "
-        "understated where their jerk jumps too little to be seen, which shows where it outweighs the sensors' own "
-        "(section 4)."
+        f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, in "
+        "part because two errors offset each other: the noise propagated from the encoders is overstated where joints "
+        "move smoothly and understated where jumps of their jerk are too small to be detected. This matters where it "
+        "exceeds the noise of the sensors (section 4)."
     )
     document.items(sentences)
     add_number_table(
@@ -253,8 +252,8 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
         HEADER,
         [row for row in _coverage_rows(cases) if row[0].endswith(f": {Method.IMPORTANCE}") or row[0].startswith(ALL)],
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
-        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none of the "
-        "whole system. Laplace and emcee of each case are in calibration-coverage.csv.",
+        "intervals, with the standard error over replicates. Emcee samples one replicate in twenty, and none of the "
+        "whole system. Results of Laplace and emcee for each case are in calibration-coverage.csv.",
     )
 
 
@@ -269,7 +268,7 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     sentences = [
         f"Replicates that raised an error: {len(errors)}." + "".join(f" {text}." for text in sorted(set(errors))),
         f"Searches for the mode that did not converge: {modes}. Runs of emcee that did not converge: {chains} of "
-        f"{sampled}. Replicates whose weights are not trusted (Pareto k-hat of {TRUSTED:g} and more): {untrusted}; "
+        f"{sampled}. Replicates whose weights are not trusted (Pareto k-hat of {TRUSTED:g} or more): {untrusted}; "
         "they count like all others.",
     ]
     short = [
@@ -280,15 +279,15 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     if short:
         sentences.insert(
             0,
-            f"Intervals that hold the truth less often than they state, by more than {SHORT:g} standard errors before "
+            f"Intervals that contain the truth less often than stated, by more than {SHORT:g} standard errors before "
             f"any correction for the number of cases: {', '.join(short)}.",
         )
     if shifts:
         sentences.append(
-            "The initial rate in a posterior is not the base's own, but the one that belongs to the joints as "
-            "smoothed: an error of a smoothed joint speed at time 0 moves it, and its stated interval leaves that out. "
-            f"Root mean square of the difference in stated standard deviations: {shifts}. Ranks and coverage here are "
-            "of the rate as the posterior means it; the bodies are the same in both readings."
+            "The initial rate in a posterior is not the true rate of the base, but the one that matches the smoothed "
+            "joints: an error of a smoothed joint speed at time 0 shifts it, and its stated interval excludes this "
+            f"shift. Root mean square of the difference in stated standard deviations: {shifts}. Ranks and coverage "
+            "here refer to the rate as the posterior defines it; the bodies are the same in both definitions."
         )
     document.items(sentences)
 
@@ -353,7 +352,7 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
 
 STUDY = Study(
     "calibration",
-    "Whether the truth lies as often within the stated intervals as they say.",
+    "Check whether the truth lies within the stated intervals as often as stated.",
     run=run,
     report=_report,
     full="all replicates of all cases (hours)",

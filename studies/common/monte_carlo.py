@@ -45,7 +45,7 @@ class Outcomes:
         if self.failures:
             number, message = min(self.failures.items())
             many = f"{len(self.failures)} of {len(self.results)}"
-            raise RuntimeError(f"{many} trials failed, the first of them number {number}: {message}")
+            raise RuntimeError(f"{many} trials failed, the first is number {number}: {message}")
         return self.results
 
 
@@ -103,10 +103,10 @@ def run_trials(
             failed = f", {len(outcomes.failures)} failed" if outcomes.failures else ""
             progress(
                 f"{done} of {len(tasks)} trials{failed}, {60.0 / max(pace, 1e-9):.3g} a minute, "
-                f"{pace * (len(tasks) - done) / 60.0:.2g} minutes left"
+                f"{pace * (len(tasks) - done) / 60.0:.2g} minutes to go"
             )
     except KeyboardInterrupt:
-        kept = "Nothing is kept" if file is None else f"{done} of {len(tasks)} are kept in {file}; run again to go on"
+        kept = "Nothing was stored" if file is None else f"{file} contains {done} of {len(tasks)}; run again to resume"
         progress(f"The trials were interrupted. {kept}.")
         raise
     return outcomes
@@ -175,13 +175,13 @@ def _resume(file: Path, header: dict[str, Any], tasks: Sequence[Any]) -> dict[in
         file.write_text(json.dumps(header) + "\n", encoding="utf-8")
         return {}
     if lines[0] != header:
-        raise ValueError(f"{file} holds trials of {lines[0]}, not of {header}; give another file")
+        raise ValueError(f"{file} contains trials of {lines[0]}, not of {header}; give another file")
     stored = {}
     for line in lines[1:]:
         number = line["trial"]
         if number < len(tasks) and line["task"] != json.loads(json.dumps(tasks[number], default=_plain)):
-            other = f"{line['task']} in place of {tasks[number]}"
-            raise ValueError(f"{file} holds trial {number} of another plan, {other}; give another file")
+            other = f"{line['task']} instead of {tasks[number]}"
+            raise ValueError(f"{file} contains trial {number} of another plan, {other}; give another file")
         if number < len(tasks) and "result" in line:
             stored[number] = line["result"]
     # what was cut off must not run into the next line

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]  # folder of the checkout
 COUNTS = ("starts", "searches", "repeats", "flights", "ships")
 
 # what a report says that only sets trials anew that were made before
-KEPT = "Trials were kept from former runs, and what they took is the time of the machines that made them"
+KEPT = "Trials were read from earlier runs, and their times are those of the machines that made them"
 
 MODELS = ROOT / "bayesid" / "robot" / "models"  # folder of the robots that are shipped
 

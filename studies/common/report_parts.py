@@ -10,19 +10,19 @@ from bayesid.report import Document
 # meanings by term, as reports write it
 TERMS = {
     "a-optimal": "smallest sum of the posterior variances",
-    "chi-square": "sum of squared residuals in standard deviations, per sample 1 where the model is right",
+    "chi-square": "sum of squared residuals in standard deviations, per sample 1 if the model is right",
     "condition number": "largest over smallest singular value of the columns to be identified",
     "d-optimal": "smallest determinant of the posterior covariance",
     "e-optimal": "smallest variance in the worst direction",
     "(26)": "the paper's criterion for manoeuvres",
-    "effective samples": "independent samples that would tell as much",
+    "effective samples": "number of independent samples with the same information",
     "emcee": "ensemble sampler of the posterior",
     "family-wise": "for all tests together",
     "importance sampling": "weighted draws from the Laplace approximation",
     "Laplace": "the normal distribution at the posterior's mode",
     "ln B": "logarithm of the ratio of two models' evidences",
     "NUTS": "Hamiltonian Monte Carlo without U-turns",
-    "ranks": "places of the truth among posterior draws",
+    "ranks": "positions of the truth among the posterior draws",
     "sd": "standard deviation",
     "rms": "root mean square",
 }

@@ -30,24 +30,24 @@ R = TypeVar("R")
 
 # options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`
 WORKERS: Mapping[str, Mapping[str, Any]] = {
-    "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
+    "--workers": {"type": int, "default": 1, "help": "number of processes for the trials"},
     "--scheduler": {
         "metavar": "ADDRESS",
         "dest": "workers",
         "type": executor_at,
-        "help": "scheduler of dask.distributed whose workers run the trials, in place of processes of this machine",
+        "help": "dask.distributed scheduler whose workers run the trials, instead of processes on this machine",
     },
 }
 
 # options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`
 TRIALS: Mapping[str, Mapping[str, Any]] = {
-    "--trials": {"type": Path, "help": "file that keeps the Monte Carlo trials, for an interrupted run"},
+    "--trials": {"type": Path, "help": "file that stores the Monte Carlo trials, to resume an interrupted run"},
     **WORKERS,
 }
 
 # option of a study whose trials are made by many runs
 MADE: Mapping[str, Mapping[str, Any]] = {
-    "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}
+    "--made": {"action": "store_true", "help": "report the stored trials without making more"}
 }
 
 
@@ -155,7 +155,7 @@ class Report(Generic[R]):
     statements: Sequence[Statement] = ()  # what is found of the paper's statements
     tables: Sequence[CsvTable] = ()  # tables beside the report
     # sentence on these tables; ``{all}`` stands for all names of files, ``{0}`` for the first
-    beside: str = "Tables beside this report: {all}."
+    beside: str = "Tables with this report: {all}."
     credit: str = ""  # sentence added to where the report comes from
 
     def document(self, result: R, output: Path) -> Document:
@@ -179,7 +179,7 @@ class Report(Generic[R]):
         for section in self.sections:
             section(document, result)
         if self.statements:
-            document.section("What the paper states, and what is found here")
+            document.section("Statements of the paper and results of this study")
             rows = [[statement.text, statement.finding.value, statement.reason] for statement in self.statements]
             document.table(["the paper", "finding", "why"], rows, "Statements of the paper.", ["left"] * 3)
         files = [table.write(output) for table in self.tables]
@@ -221,11 +221,11 @@ class Command:
         if options.output.is_dir() or not options.output.suffix:
             options.output /= report.name
         if getattr(options, "made", False) and options.trials is None:
-            parser.error("--made reports trials that were kept: give their file with --trials")
+            parser.error("--made reports stored trials: give their file with --trials")
         summary = options.output.with_suffix(".json")  # written beside the report
         for name, value in vars(options).items():
             if isinstance(value, Path) and value == summary:
-                parser.error(f"--{name} {value} is the file of the report's summary: give another name")
+                parser.error(f"--{name} {value} is the file for the report's summary: give another name")
         options.output.parent.mkdir(parents=True, exist_ok=True)
         return options
 

@@ -1,4 +1,4 @@
-"""Cost: what commands take from files to answers, by phase, cold and with compiled code kept, and how that grows."""
+"""Cost: time and memory of the commands, by phase, with and without cached code, and their growth."""
 
 from studies.cost.report import STUDY
 

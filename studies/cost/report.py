@@ -30,7 +30,7 @@ CHEAPER = 100.0  # smallest wanted ratio of one nested run for each candidate to
 def goals_of(cost: Cost) -> list[Goal]:
     """Return every goal with what was reached."""
     goals = []
-    for kind, limits in (("with compiled code kept", "warm"), ("cold", "cold")):
+    for kind, limits in (("with cached compiled code", "warm"), ("cold", "cold")):
         for limit in sorted({getattr(case, limits) for case in DIAGNOSES}):
             timed = [case for case in DIAGNOSES if case.title in cost.diagnoses]
             names = [case.title for case in timed if getattr(case, limits) == limit]
@@ -43,7 +43,7 @@ def goals_of(cost: Cost) -> list[Goal]:
     sampled = {name: run.phases["sample"] for name, run in cost.sampled.items()}
     goals.append(
         Goal(
-            f"4,000 effective samples of the extended model of a single cause within {SAMPLES:g} s more",
+            f"4,000 effective samples of the extended model of a single cause within a further {SAMPLES:g} s",
             ", ".join(f"{name} {seconds:.1f} s" for name, seconds in sampled.items()) or "not sampled",
             Verdict.of(max(sampled.values()) <= SAMPLES if sampled else None),
         )
@@ -52,7 +52,7 @@ def goals_of(cost: Cost) -> list[Goal]:
     for name, limit in COMMANDS.items():
         if limit is not None and name in cost.commands:
             walls = [run.wall for run in cost.commands[name][1:]]
-            text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"
+            text = f"{name}, files to report, with cached compiled code: at most {limit:g} s"
             goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
     return goals + _many_goals(cost.many) + _search_goals(cost.search)
 
@@ -64,14 +64,14 @@ def _many_goals(many: Mapping[str, list[Run]]) -> list[Goal]:
         if row.title in many:
             warm = many[row.title][-1]
             seconds = warm.to_verdict if row.command == "diagnose" else warm.wall
-            text = f"{row.title}, compiled code kept: at most {row.seconds:g} s and {row.memory:g} GB"
+            text = f"{row.title}, cached compiled code: at most {row.seconds:g} s and {row.memory:g} GB"
             reached = f"{seconds:.0f} s, {format_number(warm.memory, 2)} GB"
             goals.append(Goal(text, reached, Verdict.of(seconds <= row.seconds and warm.memory <= row.memory)))
     return goals
 
 
 def _search_goals(search: SearchTimes | None) -> list[Goal]:
-    step = f"One criterion of a design with its gradient, one core: at most {1e3 * STEP:g} ms"
+    step = f"One evaluation of a design criterion with its gradient, one core: at most {1e3 * STEP:g} ms"
     begin = f"Cold start of a search for manoeuvres: at most {BEGIN:g} s"
     if search is None:
         return [Goal(text, "not measured", Verdict.NOT_TESTED) for text in (step, begin)]
@@ -80,7 +80,7 @@ def _search_goals(search: SearchTimes | None) -> list[Goal]:
         f"{middle_of:.1f} ms ({low:.1f} to {high:.1f}, 90 % of {len(search.criterion)} manoeuvres of {search.unknowns} "
         "free numbers)"
     )
-    start = f"{search.cold:.1f} s, {search.warm:.1f} s with compiled code kept"
+    start = f"{search.cold:.1f} s, {search.warm:.1f} s with cached compiled code"
     return [
         Goal(step, criterion, Verdict.of(middle_of <= 1e3 * STEP)),
         Goal(begin, start, Verdict.of(search.cold <= BEGIN)),
@@ -97,7 +97,7 @@ def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
 
 
 def _nested(cost: Cost) -> Goal:
-    text = f"One run of dynesty for each candidate over the verdict on all of them: at least {CHEAPER:g} times"
+    text = f"Time of one dynesty run per candidate over that of the verdict on all of them: at least {CHEAPER:g} times"
     if cost.nested is None:
         return Goal(text, "dynesty is not installed", Verdict.NOT_TESTED)
     count, seconds = max(cost.candidates.items())
@@ -105,7 +105,7 @@ def _nested(cost: Cost) -> Goal:
     bound = "" if cost.nested.done else "more than "
     said = (
         f"{bound}{format_number(ratio, 2)}: {count} candidates, "
-        f"{'' if cost.nested.done else 'not ended after '}{cost.nested.seconds:.0f} s of processor time with "
+        f"{'' if cost.nested.done else 'not finished after '}{cost.nested.seconds:.0f} s of processor time with "
         f"{cost.nested.unknowns} unknowns"
     )
     return Goal(text, said, Verdict.PASS if ratio >= CHEAPER else Verdict.FAIL if cost.nested.done else Verdict.OPEN)
@@ -123,28 +123,28 @@ def _report(cost: Cost) -> Report[Cost]:
     goals = goals_of(cost)
     return Report(
         title="Cost",
-        subtitle="What commands take from files to answers",
-        question="How long do commands take from files to answers, with compiled code kept and without, how much "
-        "memory, and how does that grow with the problem?",
-        answer=f"A diagnosis of three recordings comes to its verdict in {warm[quickest]:.1f} s ({quickest}) to "
-        f"{warm[slowest]:.1f} s ({slowest}) with compiled code kept, with the whole catalogue{_limits_text(warm)}; "
+        subtitle="Time and memory of commands, from files to answers",
+        question="How long do commands take from files to answers, with and without cached compiled code, how much "
+        "memory do they need, and how does that grow with the problem?",
+        answer=f"A diagnosis of three recordings reaches its verdict in {warm[quickest]:.1f} s ({quickest}) to "
+        f"{warm[slowest]:.1f} s ({slowest}), with the whole catalogue and cached compiled code.{_limits_text(warm)} "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
         goals=goals,
-        valid=f"run on {processor()}, two cores, with nothing beside it. The machine's speed varies by a third from "
-        "day to day.",
+        valid=f"run on {processor()}, two cores, with no other load. The machine's speed varies by a third from day to "
+        "day.",
         full=cost.full,
         figure=Picture(
             phases_figure(cost),
-            "Time from files to report of each diagnosis, without compiled code (left bar) and with it (right bar): "
-            "orange until the verdict, blue after it. Samples are not drawn.",
+            "Time from files to report of each diagnosis, without cached compiled code (left bar) and with it (right "
+            "bar): orange until the verdict, blue after it. Samples are not drawn.",
         ),
         setup=Setup(
             robot="A servicer with three joints where files are timed; ETS-VII and chains of links for evaluations.",
-            manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight's rule: only times count.",
+            manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight rule: only times count.",
             sensors="Rate and accelerometer at 4 Hz and encoders, written to files by MuJoCo.",
-            known="Links, orbit and sensors, as the study files say.",
-            unknown="Base and initial rates, and what is hidden.",
-            replicates="One run without compiled code and three with it; medians, with the smallest and the largest.",
+            known="Links, orbit and sensors, as stated in the study files.",
+            unknown="Base and initial rates, and the hidden cause.",
+            replicates="One run without cached compiled code and three with it; medians, with smallest and largest.",
         ),
         sections=[_phases, _compared, _growth],
         tables=[_runs(cost)],
@@ -171,7 +171,7 @@ def _limits_text(warm: Mapping[str, float]) -> str:
         times = {case.title: warm[case.title] for case in DIAGNOSES if case.title in warm and case.warm == limit}
         late = sum(value > limit for value in times.values())
         parts.append(f"{limit:g} s ({joined(times)}), missed by {late} of {len(times)}")
-    return f"; wanted are {joined(parts)}" if parts else ""
+    return f" The limits are {joined(parts)}." if parts else ""
 
 
 def _phases(document: Document, cost: Cost) -> None:
@@ -186,9 +186,9 @@ def _phases(document: Document, cost: Cost) -> None:
     document.table(
         ["diagnosis of", *phases, "memory [GB]"],
         rows,
-        "Time by phase [s], without compiled code / with it; medians. Start: import of the package, reading of the "
-        "files, smoothing of the joints' motion. Compile: what the simulation needs; further functions are compiled or "
-        "read within the phases that use them.",
+        "Time by phase [s], without / with cached compiled code; medians. Start: import of the package, reading of the "
+        "files, smoothing of the joints' motion. Compile: functions of the simulation; further functions are compiled "
+        "or loaded in the phases that use them.",
         columns("l" + "r" * (len(phases) + 1)),
     )
     rows = []
@@ -203,7 +203,8 @@ def _phases(document: Document, cost: Cost) -> None:
         document.table(
             ["command", "cold [s]", "warm", "memory [GB]", "phases, warm [s]"],
             rows,
-            f"Other commands on the recordings with nothing hidden, files to report; design with its defaults.{unsaid}",
+            "Other commands on the recordings with nothing hidden, from files to report; design with its default "
+            f"settings.{unsaid}",
             columns("lrrrl"),
         )
 
@@ -226,18 +227,18 @@ def _compared(document: Document, cost: Cost) -> None:
                 rows.append([f"diagnose ({name})" if kind == "diagnose" else name, f"{was:.1f}", f"{now:.1f}", change])
     within = f"within {100.0 * CHANGED:.0f} % of the run that wrote {cost.before.name}"
     if not rows:
-        document.paragraph(f"All times to the report with compiled code kept lie {within}.")
+        document.paragraph(f"All times to the report with cached compiled code are {within}.")
         return
     document.table(
         ["command", "then [s]", "now [s]", "change [%]"],
         rows,
-        f"Files to report with compiled code kept, beside an earlier run. All that is not listed lies {within}.",
+        f"Files to report with cached compiled code, compared with an earlier run. All others are {within}.",
         columns("lrrr"),
     )
 
 
 def _growth(document: Document, cost: Cost) -> None:
-    document.section("Growth, and the floor")
+    document.section("Growth, and the lower bound")
     grown = [(name, "{:.0f} µs", 1e6, times) for name, times in cost.growth.items()]
     if len(cost.candidates) > 1:
         grown.append(("candidates (verdict)", "{:.2f} s", 1.0, cost.candidates))
@@ -249,19 +250,19 @@ def _growth(document: Document, cost: Cost) -> None:
     document.table(
         ["what grows", "sizes", "time of the first", "ratios to the first"],
         rows,
-        "Time of one evaluation of the log density of ETS-VII in a batch, and of a verdict by number of candidates.",
+        "Time of one evaluation of ETS-VII's log density in a batch, and time of a verdict by number of candidates.",
         columns("llrl"),
     )
     floor = cost.floor
     document.paragraph(
-        f"One evaluation, of ETS-VII with {EVALUATED}, has {format_number(floor.operations / 1e6, 3)} million "
+        f"One evaluation, of ETS-VII with {EVALUATED}, takes {format_number(floor.operations / 1e6, 3)} million "
         "floating-point operations and, by the compiler's count, reads and writes "
-        f"{format_number(floor.traffic / 1e6, 3)} MB, most of it in caches. One core multiplies matrices at "
+        f"{format_number(floor.traffic / 1e6, 3)} MB, mostly in caches. One core multiplies matrices at "
         f"{format_number(floor.speed / 1e9, 3)} GFLOP/s and streams {format_number(floor.bandwidth / 1e9, 3)} GB/s "
-        f"from memory. At that speed the operations alone would take {format_number(1e6 * floor.least, 2)} µs, of the "
-        f"{format_number(1e6 * floor.seconds, 3)} µs measured here: one evaluation is "
-        f"{format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and short loops "
-        "are."
+        f"from memory. At that speed the operations alone would take {format_number(1e6 * floor.least, 2)} µs; "
+        f"{format_number(1e6 * floor.seconds, 3)} µs were measured here. One evaluation is "
+        f"{format_number(floor.seconds / floor.least, 2)} times above that bound, as is usual for small matrices and "
+        "short loops."
     )
 
 
@@ -284,11 +285,11 @@ def phases_figure(cost: Cost) -> Figure:
 
 STUDY = Study(
     "cost",
-    "Measure what commands take from files to answers, and how that grows.",
+    "Measure time and memory of commands from files to answers, and how they grow with the problem.",
     run=run,
     report=_report,
-    full="every run repeated, samples drawn, and a nested sampler for up to ten minutes",
+    full="repeat every run, draw samples, and run a nested sampler for up to ten minutes",
     seed=0,
-    extra={"--before": {"type": Path, "help": "CSV file of the times of an earlier run to compare with"}},
+    extra={"--before": {"type": Path, "help": "CSV file with the times of an earlier run, for comparison"}},
     inputs=lambda options: [MODELS / "ets7.urdf", *([] if options.before is None else [options.before])],
 )

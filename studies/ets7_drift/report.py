@@ -45,41 +45,41 @@ def _report(cases: Cases) -> Report[Cases]:
         title="Drift of ETS-VII",
         subtitle="Section 2.1 and figure 2 of Lampariello and Hirzinger (IDETC 2005)",
         question="With attitude control off, the attitude of ETS-VII drifted away from its simulation (the paper's "
-        "figure 2). Can the causes be named from rates and joints alone, with the base known to 5 %, and does the "
-        "simulation with them predict the measured attitude, which was not used?",
+        "figure 2). Can the causes be named from rates and joints alone, with a base uncertain by 5 % (1 sigma), and "
+        "does the simulation with them predict the measured attitude, which was not used?",
         answer=" ".join(_answer(name, case) for name, case in cases.items()),
-        valid="the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and "
-        "the noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
+        valid="the links are known exactly (in the paper only to 5 %), the wheels' momentum is constant and the noise "
+        "is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
         goals=[goal for name in analysis.KNOWN for goal in goals_of(name, cases.get(name))],
         full=set(cases) == set(analysis.KNOWN),
         figure=Picture(
             attitude_figure(shown.attitudes[0]),
-            f"Base known to {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 with "
-            "its remedy, Euler angles of the base since the start; the bump between 60 and 145 s is the motion of the "
-            "arm. Below: error of the predicted attitude, with the 95 % band predicted from what the rates leave "
-            "unknown and the attitude's noise.",
+            f"Base uncertain by {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 "
+            "with its remedy, Euler angles of the base since the start; the bump between 60 and 145 s is the motion of "
+            "the arm. Below: error of the predicted attitude, with the predicted 95 % band, which includes the "
+            "uncertainty after the rates and the attitude's noise.",
         ),
         setup=Setup(
-            robot=f"ETS-VII as shipped with this package, on a circular orbit of {RADIUS / 1e3:g} km, without attitude "
-            "control. An independent simulator (MuJoCo) makes the recordings.",
+            robot=f"ETS-VII as supplied with this package, on a circular orbit of {RADIUS / 1e3:g} km, without "
+            "attitude control. An independent simulator (MuJoCo) generates the recordings.",
             manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; "
-            f"its linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, where "
-            f"the flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
+            f"its linear ramps are replaced by quintic ones. The tip moves at up to {1e3 * fastest:.0f} mm/s; the "
+            f"flight rule is {1e3 * TIP_SPEED:.0f} mm/s.",
             sensors=f"Every {analysis.INTERVAL:g} s, noise per sample: rates {format_number(analysis.RATE_SIGMA)} "
-            f"rad/s (the paper's star sensor: 2 arcsec), joints {format_number(analysis.ENCODER_SIGMA)} rad. The "
-            f"attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, is kept for comparison alone, but for the exact "
-            "one at the start.",
+            f"rad/s (the paper's star tracker: 2 arcsec), joints {format_number(analysis.ENCODER_SIGMA)} rad. The "
+            f"attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, is used for comparison only, except for the "
+            "exact one at the start.",
             known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
-            unknown=f"Base body, with a mass known to {' or '.join(analysis.KNOWN)}, of which the true base is a draw; "
-            f"hidden: gravity gradient, momentum {format_vector(analysis.MOMENTUM)} N m s left in the wheels, and "
-            f"initial rates of {format_number(analysis.RATE)} rad/s per axis (assumed, as no values are public).",
-            replicates=f"{len(shown.world.manoeuvres)} recordings of {analysis.DURATION:g} s, attitudes and places on "
-            "orbit drawn at random, one base. A single world: rates of right verdicts are in the report on blind "
-            "injections.",
+            unknown=f"Base body, with a mass uncertain by {' or '.join(analysis.KNOWN)} (1 sigma); the true base is a "
+            f"draw from this prior. Hidden: gravity gradient, wheel momentum {format_vector(analysis.MOMENTUM)} N m s, "
+            f"and initial rates of {format_number(analysis.RATE)} rad/s per axis (assumed, as no values are public).",
+            replicates=f"{len(shown.world.manoeuvres)} recordings of {analysis.DURATION:g} s with random attitudes and "
+            "positions in orbit, one base. This is a single scenario: rates of right verdicts are in the report on "
+            "blind injections.",
         ),
         picture=Picture(
             figures.robot_pose(ets7(), analysis.MOTION, rests),
-            f"ETS-VII with the joints at rest, before the manoeuvre and between its two turns ({rests[1]:g} s).",
+            f"ETS-VII with the joints at rest, before the manoeuvre and between its two parts ({rests[1]:g} s).",
         ),
         sections=[_negatives, _evidence],
         statements=_statements(cases),
@@ -98,16 +98,16 @@ def _shown(cases: Cases) -> tuple[str, Case]:
 def _answer(known: str, case: Case) -> str:
     """Return what is said and predicted with the base known to so much."""
     before, after = (format_number(_rms(case, name), 2) for name in ("plain", "extended"))
-    text = f"With the base known to {known} the diagnosis "
+    text = f"With a base uncertain by {known} (1 sigma) the diagnosis "
     if case.right:
-        text += "names the three true causes and no other"
+        text += "names exactly the three true causes"
     elif case.diagnosis.verdict.causes:
         text += f"is wrong or incomplete ({', '.join(case.diagnosis.verdict.causes)})"
     else:
         text += f"names nothing (verdict: {case.diagnosis.verdict.status.value})"
     if not case.diagnosis.verdict.causes:
-        return f"{text}, and the attitude stays {before} degrees off."
-    return f"{text}, and the attitude is predicted to {after} degrees (rms), where it was {before} degrees off."
+        return f"{text}, and the attitude error stays at {before} degrees (rms)."
+    return f"{text}; with these causes the attitude error is {after} degrees (rms), without them {before}."
 
 
 def _rms(case: Case, name: str) -> float:
@@ -117,10 +117,10 @@ def _rms(case: Case, name: str) -> float:
 def goals_of(known: str, case: Case | None) -> list[Goal]:
     """Return the goals with the base known to so much, set before the study was run; not tested without a case."""
     texts = (
-        f"base known to {known}: the three true causes are named, and no other",
-        f"base known to {known}: attitude predicted {BETTER:g} times nearer than by the present simulation (rms)",
-        f"base known to {known}: the 95 % band holds the attitude at the ends, in all axes or all but one",
-        f"base known to {known}: amplitudes and base within {FAR:g} sd of the truth",
+        f"base uncertain by {known}: exactly the three true causes are named",
+        f"base uncertain by {known}: attitude error {BETTER:g} times smaller than that of the present simulation (rms)",
+        f"base uncertain by {known}: the 95 % band contains the attitude at the ends, in all axes or all but one",
+        f"base uncertain by {known}: amplitudes and base within {FAR:g} sd of the truth",
     )
     if case is None:
         return [Goal(text, "not run", Verdict.NOT_TESTED) for text in texts]
@@ -152,7 +152,7 @@ def _true(case: Case) -> float:
 
 
 def _negatives(document: Document, cases: Cases) -> None:
-    document.section("What fails, and how sure the answer is")
+    document.section("Failures and confidence in the answer")
     document.items([text for name, case in cases.items() for text in _failures(name, case)])
 
 
@@ -160,32 +160,32 @@ def _failures(known: str, case: Case) -> list[str]:
     verdict, gain = case.diagnosis.verdict, case.diagnosis.gain
     off = (gain.before.bodies.mean[0] / case.world.base[0] - 1.0) * 100.0
     texts = [
-        f"Base known to {known}: the present simulation cannot be mended by its base. "
+        f"Base uncertain by {known}: changing the base does not fix the present simulation. "
         + (
-            "Every fit of it diverges, so that the base stays at its prior"
+            "Every fit diverges, so the base stays at its prior"
             if case.diagnosis.bodies_fixed
-            else f"Fitted to the rates, the base's mass is {format_signed(float(off), 0)} % off"
+            else f"Fitted to the rates, the base's mass has an error of {format_signed(float(off), 0)} %"
         )
-        + f", and the attitude is {format_number(_rms(case, 'fitted'), 2)} degrees off (rms)."
+        + f", and the attitude error is {format_number(_rms(case, 'fitted'), 2)} degrees (rms)."
     ]
     missed = [cause for cause in analysis.CAUSES if cause not in verdict.causes]
     wrong = [cause for cause in verdict.causes if cause not in analysis.CAUSES]
     if missed or wrong:
         texts.insert(
             0,
-            f"Base known to {known}: missed are {', '.join(missed) or 'none'}; wrongly named "
-            f"{', '.join(wrong) or 'none'}. Probability of something outside the catalogue: "
+            f"Base uncertain by {known}: the diagnosis misses {', '.join(missed) or 'no cause'} and wrongly names "
+            f"{', '.join(wrong) or 'none'}. Probability of a cause outside the catalogue: "
             f"{format_probability(case.diagnosis.probabilities.unknown)}.",
         )
     if verdict.ambiguous_with:
-        texts.append(f"Other explanations that stay possible: {'; '.join(map(set_text, verdict.ambiguous_with))}.")
+        texts.append(f"Other explanations that remain possible: {'; '.join(map(set_text, verdict.ambiguous_with))}.")
     if verdict.equivalent_to:
         others = "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalent_to.items())
         texts.append(f"Other names of the same change of the model: {others}.")
     inside = np.mean([np.abs(attitude.missed) <= REACH * attitude.sd for attitude in case.attitudes])
     texts.append(
-        f"Base known to {known}: over all samples the band holds {format_percent(float(inside), 3)} of the measured "
-        "angles, whose errors along one recording are correlated."
+        f"Base uncertain by {known}: over all samples the band contains {format_percent(float(inside), 3)} of the "
+        "measured angles, whose errors along one recording are correlated."
     )
     return texts
 
@@ -193,15 +193,15 @@ def _failures(known: str, case: Case) -> list[str]:
 def _evidence(document: Document, cases: Cases) -> None:
     document.section("Evidence")
     document.table(
-        ["base known to", "causes", "probability", "log evidence", "chi-square per sample"],
+        ["base uncertain by", "causes", "probability", "log evidence", "chi-square per sample"],
         [[known, *_step_row(step)] for known, case in cases.items() for step in case.steps],
-        "The most probable sets with none to three causes, of the named ones where causes are named, each fitted. The "
-        "probability is that of the set alone, and the log evidence is relative to nothing.",
+        "The most probable sets of zero to three causes (of the named ones, where causes are named), each fitted. The "
+        "probability is that of exactly this set; the log evidence is relative to no cause.",
         columns("llrrr"),
     )
     quantities = [(known, quantity) for known, case in cases.items() for quantity in _quantities(case)]
     document.table(
-        ["base known to", "quantity", "unit", "truth", "estimate ± sd", "error [sd]"],
+        ["base uncertain by", "quantity", "unit", "truth", "estimate ± sd", "error [sd]"],
         [
             [
                 known,
@@ -215,10 +215,10 @@ def _evidence(document: Document, cases: Cases) -> None:
             if not quantity.name.startswith(("initial rate", "com", "inertia"))
         ],
         "Mass of the base and momentum of the wheels, fitted together with the other named causes. All ten parameters "
-        "and the initial rates, one vector for each recording, are in the table beside this report.",
+        "and the initial rates, one vector per recording, are in the table with this report.",
         columns("lllrrr"),
     )
-    document.items([f"Base known to {known}: {_fit_sentence(case)}" for known, case in cases.items()])
+    document.items([f"Base uncertain by {known}: {_fit_sentence(case)}" for known, case in cases.items()])
 
 
 def _quantities(case: Case) -> list[analysis.Amplitude]:
@@ -245,7 +245,7 @@ def _held_out(case: Case) -> str:
     if before is None or after is None:
         return ""
     scores = [format_number(float(score.sum()), 4) for score in (before, after)]
-    return f"The log score of recordings left out is {scores[0]} before and {scores[1]} after."
+    return f"The log score of left-out recordings is {scores[0]} before and {scores[1]} after."
 
 
 def _step_row(step: analysis.Step) -> list[str]:
@@ -269,10 +269,10 @@ def _statements(cases: Cases) -> list[Statement]:
         Statement(
             "Gravity gradient, residual momentum of the wheels and a non-zero initial rate give rise to the drift (1).",
             Finding.CONFIRMED if right else Finding.NOT_TESTABLE,
-            "In simulation: the three make a drift like that of figure 2, and with the base known to "
+            "In simulation: the three cause a drift like that of figure 2, and with a base uncertain by "
             f"{' and '.join(right)} they are named from the rates alone and predict the attitude."
             if right
-            else "The three make a drift like that of figure 2, but the diagnosis does not name them.",
+            else "The three cause a drift like that of figure 2, but the diagnosis does not name them.",
         ),
         Statement(
             "They gave rise to the drift of the flight.",
@@ -282,7 +282,8 @@ def _statements(cases: Cases) -> list[Statement]:
         Statement(
             "The simulation without external actions is a rather strong assumption.",
             Finding.CONFIRMED,
-            f"After {analysis.DURATION:g} s without the causes an angle is up to {format_number(last, 2)} degrees off.",
+            f"Without the causes an angle is wrong by up to {format_number(last, 2)} degrees after "
+            f"{analysis.DURATION:g} s.",
         ),
     ]
 
@@ -311,9 +312,9 @@ def attitude_figure(attitude: analysis.Attitude) -> Figure:
 
 STUDY = Study(
     "ets7_drift",
-    "Name what makes the attitude of ETS-VII drift.",
+    "Identify the causes of the attitude drift of ETS-VII.",
     run=analysis.run,
     report=_report,
-    full="three recordings, and a base known to 5 %%",
+    full="three recordings, and a base uncertain by 5 %% too",
     seed=1,
 )

@@ -124,7 +124,7 @@ def wide_posterior(motion: Motion) -> Posterior:
 
 
 # noise of the rate sensors by label
-RATES: dict[str, Noise] = {"star sensor 2″": StarTracker(2.0), "10⁻⁵ rad/s": White(1e-5), "10⁻⁶ rad/s": White(1e-6)}
+RATES: dict[str, Noise] = {"star tracker 2″": StarTracker(2.0), "10⁻⁵ rad/s": White(1e-5), "10⁻⁶ rad/s": White(1e-6)}
 
 # noise per sample of the accelerometers by label [m/s2]
 ACCELS = {"none": None, "10⁻⁴": 1e-4, "10⁻⁵": 1e-5, "10⁻⁷": 1e-7, "10⁻⁹": 1e-9}

@@ -56,17 +56,17 @@ def time_needed(answer: Answer, duration: float) -> str:
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
     rows = []
-    for known, title in ((False, "known to 5 %"), (True, "known exactly")):
+    for known, title in ((False, "uncertain by 5 % (1 sigma)"), (True, "known exactly")):
         once = result.after["designed"].worst(known)
         needed = time_needed(result.answers[USUAL][known, False], mission.DURATION)
-        text = f"Base's mass and moments known to {format_percent(WANTED)} after one manoeuvre, arm {title}"
+        text = f"Base's mass and moments determined to {format_percent(WANTED)} in one manoeuvre, arm {title}"
         reached = f"{format_percent(once, 2)} after one; time until {format_percent(WANTED)}: {needed}"
         rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
     rows.append(
         Goal(
             f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on excitation, same "
             "manoeuvre",
-            f"{format_percent(result.difference, 2)} at most, both rows of the arm",
+            f"{format_percent(result.difference, 2)} at most, for both uncertainties of the arm",
             Verdict.of(result.difference <= ALIKE),
         )
     )
@@ -76,14 +76,14 @@ def goals(result: Result) -> tuple[Goal, ...]:
     verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
     rows.append(
         Goal(
-            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's sensors, arm 5 "
-            "%",
+            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission sensors, arm "
+            "uncertain by 5 %",
             f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
             "excitation)",
             verdict,
         )
     )
-    rows.append(Goal("The same with the other sensors", "no flight was made", Verdict.NOT_TESTED))
+    rows.append(Goal("The same with the other sensors", "no flight was simulated", Verdict.NOT_TESTED))
     return tuple(rows)
 
 
@@ -92,16 +92,16 @@ def _report(result: Result) -> Report[Result]:
     return Report(
         title="What ETS-VII could have identified",
         subtitle="Within 50 mm/s and 5 degrees per second at the tip",
-        question="How long must the arm move within the flight's rule until mass and moments of inertia of the base "
-        "are known to 1 %, and with which sensors?",
-        answer="With the arm known to 5 % of each link's mass no time and no rate sensor or accelerometer is enough: "
-        f"at least {format_percent(_least(result), 2)} are left, since motion alone takes the scale from the arm's "
-        "mass, which measured joint torques or a known thrust would give. With the arm known exactly one manoeuvre of "
-        f"{mission.DURATION:g} s leaves {format_percent(result.after['designed'].worst(True), 2)}, with sensors of "
+        question="How long must the arm move within the flight rule until mass and moments of inertia of the base "
+        "are determined to 1 %, and with which sensors?",
+        answer=f"At least {format_percent(_least(result), 2)} uncertainty remains with an arm uncertain by 5 % (1 "
+        "sigma), whatever the time, rate sensor and accelerometer: motion alone takes the scale from the arm's mass; "
+        "measured joint torques or a known thrust would provide it. With the arm known exactly one manoeuvre of "
+        f"{mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with sensors of "
         "10⁻⁵ rad/s and 10⁻⁵ m/s².",
         goals=goals(result),
         valid="wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
-        "and noise white. Every repetition starts at a new unknown rate; bias and arm stay the same.",
+        "and noise is white. Every repetition starts at a new unknown rate; bias and arm stay the same.",
         full=True,
         figure=Picture(
             _repetition_figure(result.repetitions, result.curves),
@@ -112,20 +112,23 @@ def _report(result: Result) -> Report[Result]:
             robot="ETS-VII with the published base and nominal links. The accelerometer is at "
             f"{format_vector(ACCELEROMETER)} m, which is not published.",
             manoeuvre=f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of "
-            "the report on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 "
+            "the report on excitation, at the speed that the rule allows, and that of the flight, which turns joints 2 "
             f"to 4 by {', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within "
             f"{end - begin:g} s each, {again - end:g} s apart, with corners rounded over {CORNER:g} s.",
             sensors=f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
-            f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} "
-            "m/s². The star sensor's 2 seconds of arc are differenced and taken as white.",
-            known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link, or exactly.",
+            f"{format_number(ENCODER)} rad. Those of the mission have {format_number(RATE)} rad/s and "
+            f"{format_number(ACCEL)} m/s². The star tracker's 2 seconds of arc are differenced and treated as white.",
+            known="Gravity gradient, attitude at the start, and the arm: each link's mass uncertain by 5 % (1 sigma), "
+            "or exact.",
             unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
             replicates="Standard deviations to first order; those above some 30 % are rough.",
         ),
         outline=robot_outline(ets7(), START),
         picture=Picture(
-            manoeuvre_figure({"d-optimal manoeuvre": result.motion, "the flight's own": mission.flight_manoeuvre()}),
-            "The two manoeuvres in MuJoCo: joints, speed of the tip with the rule dotted, and rotation of the base.",
+            manoeuvre_figure(
+                {"d-optimal manoeuvre": result.motion, "manoeuvre of the flight": mission.flight_manoeuvre()}
+            ),
+            "The two manoeuvres in MuJoCo: joints, speed of the tip (the rule dotted), and rotation of the base.",
         ),
         sections=[_failures, _evidence],
         statements=_statements(result),
@@ -143,13 +146,15 @@ def _failures(document: Document, result: Result) -> None:
     flight, designed = result.after["flight"], result.after["designed"]
     document.items(
         [
-            f"The flight's own manoeuvre leaves {format_percent(flight.worst(False), 2)} of the worst of mass and "
-            f"moments (arm 5 %) and {format_percent(flight.worst(True), 2)} (arm exact), where the designed one leaves "
+            "After the manoeuvre of the flight the worst of mass and moments is uncertain by "
+            f"{format_percent(flight.worst(False), 2)} (arm uncertain by 5 %) and "
+            f"{format_percent(flight.worst(True), 2)} (arm exact), after the designed one by "
             f"{format_percent(designed.worst(False), 2)} and {format_percent(designed.worst(True), 2)}.",
-            "The manoeuvre was designed for the mission's sensors alone; a design for others would need less time with "
-            "them. The smoothing of the joints was judged on the planned motion.",
-            "The encoders' noise reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better "
-            "than one of 10⁻⁷. Collisions and true joint ranges, which are not published, are not considered.",
+            "The manoeuvre was designed for the mission sensors only; a design for other sensors would need less time "
+            "with them. The smoothing of the joints was assessed on the planned motion.",
+            "The encoders' noise propagates to the accelerometer, so an accelerometer of 10⁻⁹ m/s² is not a hundred "
+            "times better than one of 10⁻⁷. Collisions and true joint ranges, which are not published, are not "
+            "considered.",
         ]
     )
 
@@ -169,8 +174,9 @@ def _evidence(document: Document, result: Result) -> None:
         ["rate sensor", "accelerometer [m/s²]", "once, arm 5 %", "1 % after", "once, arm exact", "1 % after"],
         rows,
         "Largest relative sd of mass and moments after one designed manoeuvre, and time until 1 %, bias unknown. "
-        f"“Never” has in brackets what {format_number(LONGEST * mission.DURATION / YEAR, 2)} years leave. The shortest "
-        f"time considered is {mission.DURATION:g} s.",
+        "“Never” is followed in brackets by the sd that remains after "
+        f"{format_number(LONGEST * mission.DURATION / YEAR, 2)} years. The shortest time considered is "
+        f"{mission.DURATION:g} s. Arm 5 %: each link's mass uncertain by 5 % (1 sigma).",
         words=2,
     )
     designed, flight = result.after["designed"], result.after["flight"]
@@ -182,12 +188,12 @@ def _evidence(document: Document, result: Result) -> None:
             [heading, format_number(designed.truth[k], 4), *(format_number(float(sd[k]), 3) for sd in columns)]
             for k, heading in enumerate(HEADINGS)
         ],
-        "Standard deviations from one manoeuvre with the mission's sensors and unknown bias.",
+        "Standard deviations after one manoeuvre with the mission sensors and unknown bias.",
     )
 
 
 def _statements(result: Result) -> list[Statement]:
-    star, good = ("star sensor 2″", "10⁻⁵"), ("star sensor 2″", "10⁻⁹")
+    star, good = ("star tracker 2″", "10⁻⁵"), ("star tracker 2″", "10⁻⁹")
     cells = result.answers
     reasons = [
         f"{label} m/s²: {format_percent(cells[key][True, False].once, 2)} after one manoeuvre, "
@@ -200,13 +206,13 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "Rates to 2 seconds of arc and accelerations to 10⁻⁵ to 10⁻⁹ m/s² are available (4.3).",
             Finding.REFUTED if once > 0.02 else Finding.CONFIRMED,
-            f"Read as enough for the 2 % that the paper names, with the arm exact. {'; '.join(reasons)}.",
+            f"Tested as sufficient for the 2 % that the paper names, with the arm exact. {'; '.join(reasons)}.",
         ),
         Statement(
             "The base's mass is identified to 0.01 % with a given arm, which CAD data know to 5 % (1 and 4.1).",
             Finding.REFUTED,
-            f"5 % of each link's mass leave {format_percent(_least(result), 2)} of the base's, whatever the rate "
-            "sensor and the accelerometer.",
+            f"With each link's mass uncertain by 5 %, the base's is uncertain by {format_percent(_least(result), 2)}, "
+            "whatever the rate sensor and the accelerometer.",
         ),
     ]
 
@@ -259,9 +265,11 @@ def _ticks(limits: tuple[float, float]) -> tuple[list[float], list[str]]:
 
 STUDY = Study(
     "ets7_limits",
-    "Say what ETS-VII could have identified within its rules.",
+    "Determine what ETS-VII could have identified within its flight rules.",
     run=run,
     report=_report,
-    extra={"--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of excitation"}},
+    extra={
+        "--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of the study excitation"}
+    },
     inputs=lambda options: [MODELS / "ets7.urdf", options.tables / "excitation-manoeuvres.csv"],
 )

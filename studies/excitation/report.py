@@ -39,6 +39,9 @@ TITLES = {
 DRAWN = ("printed", "paper-26", "condition-number", "d-optimal")  # manoeuvres that are drawn
 HEADLINE, IDEAL = mission.ROWS  # what is known of the arm: in the headline, and in the idealised row
 
+# what is known of the arm, as texts and legends state it
+ARMS = dict(zip(mission.ROWS, ("arm uncertain by 5 % (1 sigma)", "arm known exactly"), strict=True))
+
 # factor over the condition number that is wanted, and largest deviation of realised from predicted errors
 WANTED, WITHIN = 1.3, 0.05
 
@@ -56,7 +59,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
     rows = []
     for row in mission.ROWS:
         factor = contest.factor("d-optimal", "condition-number", row)
-        text = f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, {row}"
+        text = f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, {ARMS[row]}"
         rows.append(Goal(text, f"{factor:.2f} times", Verdict.of(factor >= WANTED)))
     rows += _search_goals(result)
     for name, realised in result.realised.items():
@@ -71,22 +74,22 @@ def goals(result: Result) -> tuple[Goal, ...]:
         rows.append(Goal(text, reached, verdict))
     rows.append(
         Goal(
-            "By every criterion, the manoeuvre designed for it is the best of all",
+            "For every criterion, the manoeuvre designed by it is the best of all",
             f"{'yes' if contest.consistent else 'no'}, {len(contest.designs)} designs",
             Verdict.of(contest.consistent),
         )
     )
     kept = all(limit.kept for design in contest.designs.values() for limit in design.reached)
     finer = "on a grid eight times finer than the search's"
-    rows.append(Goal("Every limit kept", finer if kept else f"broken {finer}", Verdict.of(kept)))
+    rows.append(Goal("Every limit satisfied", finer if kept else f"violated {finer}", Verdict.of(kept)))
     return tuple(rows)
 
 
 def _search_goals(result: Result) -> list[Goal]:
     starts = f"{STARTS} starts"
     largest = (
-        f"Largest factor over (26) that {starts} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
-        "the best known"
+        f"Largest factor over (26) from {starts}; {SEVERAL} completed searches within {format_percent(ALIKE)} of the "
+        "best known"
     )
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
     robots = _robots_goal(starts, result)
@@ -134,7 +137,7 @@ def _largest_goal(text: str, result: Result, crowd: Crowd) -> Goal:
     within = int((np.expm1((followed - _best_known(result, crowd)) / PARAMETERS) <= ALIKE).sum())
     count = len(crowd.costs)
     reached = (
-        f"{_largest(result.contest)} from {count} starts; {within} of {len(followed)} followed searches within "
+        f"{_largest(result.contest)} from {count} starts; {within} of {len(followed)} completed searches within "
         f"{format_percent(ALIKE)} of the best known"
     )
     return Goal(text, reached, Verdict.PASS if within >= SEVERAL and count >= STARTS else Verdict.OPEN)
@@ -151,7 +154,7 @@ def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
     within = int((worse <= ALIKE).sum())
     reached = (
         f"{format_percent(worse.mean(), 2)} worse in the mean of {len(costs)} searches, {within} of them within "
-        f"{format_percent(ALIKE)}; first descents from {USUAL} starts {format_percent(usual, 2)}"
+        f"{format_percent(ALIKE)}; {format_percent(usual, 2)} for first descents from {USUAL} starts"
     )
     return Goal(text, reached, Verdict.of(worse.mean() <= ALIKE) if len(crowd.costs) >= STARTS else Verdict.OPEN)
 
@@ -161,32 +164,34 @@ def _report(result: Result) -> Report[Result]:
     factors = {row: contest.factor("d-optimal", "condition-number", row) for row in mission.ROWS}
     shrink = contest.shrink
     return Report(
-        title="Which manoeuvre tells most about the base",
+        title="The most informative manoeuvre for the base",
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
-        question="Which manoeuvre of ETS-VII, within the rule of its flight, tells most about its base?",
-        answer="The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
-        f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
-        f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}; {_starts(result)}.",
-        valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
-        "mm/s and 5 degrees per second at the tip; the base rests at first and only the gravity gradient acts.",
+        question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
+        answer=f"The d-optimal manoeuvre gives {factors[HEADLINE]:.2f} times smaller standard deviations of the base "
+        f"(geometric mean) than the best condition number, with the {ARMS[HEADLINE]}. With the {ARMS[IDEAL]} they are "
+        f"{factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
+        valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
+        "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
+        "gradient acts.",
         goals=goals(result),
         full=result.full,
         figure=Picture(
             _factor_figure(contest),
-            "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one: how many "
-            "times less it tells. Filled: arm known to 5 % of each link's mass; open: arm known exactly.",
+            "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one; larger is "
+            "less informative. Filled: each link's mass uncertain by 5 % (1 sigma); open: arm known exactly.",
         ),
         setup=Setup(
             robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
-            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule "
-            f"allows. The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
+            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight rule "
+            f"allows. The paper's optimum had to be reduced to {format_percent(shrink['printed'], 2)} of its "
             f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
             sensors=f"{mission.SENSORS}; the encoders' noise is part of every criterion.",
-            known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
-            unknown="The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
-            f"{format_number(BIAS)} m/s², and the links, which are marginalised.",
+            known="The gravity gradient, the attitude at the start, and the arm with each link's mass uncertain by 5 % "
+            "(1 sigma).",
+            unknown="The base (mass uncertain by a factor of e², 1 sigma), the rate at the start, the accelerometer's "
+            f"bias within {format_number(BIAS)} m/s², and the links, which are marginalised.",
             replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
-            f"criterion{_crowds(result)}; {_flights(result)}, each with an arm, a bias and noise of its own.",
+            f"criterion{_crowds(result)}; {_flights(result)}, each with a separate draw of arm, bias and noise.",
         ),
         outline=robot_outline(ets7(), START),
         sections=[_evidence, _calibration],
@@ -202,7 +207,7 @@ def _starts(result: Result) -> str:
     starts = usual if crowd is None else max(usual, len(crowd.costs))  # those of the usual search are among the crowd
     starts += 0 if result.searches is None else THOROUGH.starts * len(result.searches.costs)
     return (
-        f"d-optimality was searched from {starts} random starts, the condition number from {usual} and from the best "
+        f"the d-optimal search used {starts} random starts, that by condition number {usual} and the best manoeuvres "
         "of the other criteria"
     )
 
@@ -212,7 +217,7 @@ def _crowds(result: Result) -> str:
     if not result.crowds:
         return ""
     parts = [f"{len(crowd.costs)} by {TITLES[name]}" for name, crowd in result.crowds.items()]
-    return f", {' and '.join(parts)}, whose best the others began from, too"
+    return f", {' and '.join(parts)}, whose best manoeuvres were also starts of the others"
 
 
 def _flights(result: Result) -> str:
@@ -246,22 +251,24 @@ def _evidence(document: Document, result: Result) -> None:
         document,
         header,
         rows,
-        "Predicted posteriors, arm known to 5 % and exactly. Factor: geometric-mean sd of (26) as printed over that of "
-        "the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of the base's mass.",
+        "Predicted posteriors, arm uncertain by 5 % (1 sigma) and known exactly. Factor: geometric-mean sd of (26) as "
+        "printed over that of the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of "
+        "the base's mass.",
     )
     if result.crowds:
         document.figure(
             _crowd_figure(result),
-            "What more starts are worth: cost of every first descent, the best first, and mean of the best of n of "
-            "them with the middle 80 % (band). Left, (26) as printed over the best value; right, geometric-mean sd per "
+            "Benefit of more starts: cost of every first descent, the best first, and mean of the best of n of them "
+            "with the middle 80 % (band). Left: (26) as printed over the best value; right: geometric-mean sd per "
             f"parameter over the best by d-optimality. The dotted line is {format_percent(ALIKE)}; the square is the "
-            "best once it was followed to the end.",
+            "best after its search was completed.",
         )
     document.figure(
         _cloud_figure(result),
-        "Information (minus half the log-determinant of the covariance of the base's coordinates, arm known to 5 %) of "
-        f"{len(result.cloud.motion)} random manoeuvres, each a random part of the largest that keeps the rule, against "
-        "(26) in both readings and against the plain sum of the squared largest excursions (m² and rad²).",
+        "Information (minus half the log-determinant of the covariance of the base's coordinates, arm uncertain by "
+        f"5 %) of {len(result.cloud.motion)} random manoeuvres, each scaled at random within the largest that "
+        "satisfies the rule, against (26) in both readings and against the plain sum of the squared largest excursions "
+        "(m² and rad²).",
     )
     drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
     document.figure(
@@ -283,9 +290,9 @@ def _calibration(document: Document, result: Result) -> None:
         ["manoeuvre", "flights", "error", "beyond", "last step [sd]"],
         [[cell or "none" for cell in row] for row in rows],
         f"Flights in MuJoCo: parameters whose realised error is not within {format_percent(WITHIN)} of the predicted "
-        "sd. With a standard error of each ratio as stated some of ten lie outside by chance alone. The modes were "
-        "found by Gauss-Newton steps with the Jacobian of the plan; last step: largest change of a coordinate by the "
-        "last of them.",
+        "sd. With the stated standard error of each ratio, some of ten are outside by chance alone. The modes were "
+        "computed by Gauss-Newton steps with the Jacobian of the plan; last step: largest change of a coordinate in "
+        "the last step.",
     )
     document.figure(
         _realised_figure(result),
@@ -307,17 +314,19 @@ def _statements(result: Result) -> list[Statement]:
             "The degree of excitation of a manoeuvre is related to the amount of base body motion (3.2).",
             Finding.CONFIRMED if ranks > 0.5 else Finding.REFUTED,
             f"Over {len(cloud.motion)} random manoeuvres the rank correlation of the information with the plain sum of "
-            f"the squared excursions is {motion}, with (26) as intended {intended}, as printed {printed}.",
+            f"the squared excursions is {motion}, with (26) as intended {intended} and as printed {printed}.",
         ),
         Statement(
             "Maximising (26) gives the optimal exciting manoeuvre (3.3.1).",
             Finding.REFUTED if best > 1.05 else Finding.CONFIRMED,
-            f"The d-optimal manoeuvre leaves sds {best:.2f} times smaller than the best by (26) as intended.",
+            f"The sds of the d-optimal manoeuvre are {best:.2f} times smaller than those of the best by (26) as "
+            "intended.",
         ),
         Statement(
             "A manoeuvre that turns the base little about its third axis loses precision (4.1).",
             Finding.CONFIRMED if worse > 1.0 else Finding.REFUTED,
-            f"The poor neighbour's worst relative sd is {worse:.1f} times that of the printed optimum, arm exact.",
+            f"The poor neighbour's worst relative sd is {worse:.1f} times that of the printed optimum, arm known "
+            "exactly.",
         ),
     ]
 
@@ -346,10 +355,10 @@ def _factor_figure(contest: Contest) -> Figure:
     place = np.arange(len(names))
     for row, fill in zip(mission.ROWS, ("full", "none"), strict=True):
         values = [contest.factor("d-optimal", name, row) for name in names]
-        axes.plot(values, place, "o", color=COLOURS[0], fillstyle=fill, label=row)
+        axes.plot(values, place, "o", color=COLOURS[0], fillstyle=fill, label=ARMS[row])
     axes.axvline(1.0, color="#888888", linewidth=0.8)
     axes.axvline(WANTED, color="#888888", linewidth=0.8, linestyle=":")
-    axes.text(WANTED, place[-1] + 0.45, " wanted of the condition number", va="bottom", ha="left", fontsize=7)
+    axes.text(WANTED, place[-1] + 0.45, " goal for the condition number", va="bottom", ha="left", fontsize=7)
     axes.set(
         xscale="log", xlabel="geometric-mean sd over that of the d-optimal manoeuvre", ylim=(-0.6, place[-1] + 1.2)
     )
@@ -380,7 +389,7 @@ def _crowd_figure(result: Result) -> Figure:
         axes.fill_between(counts, low, high, color=COLOURS[0], alpha=0.2, linewidth=0.0)
         axes.plot(counts, _relative(name, crowd, shares @ ordered), color=COLOURS[0], label="best of n, mean")
         axes.plot(1 + np.arange(total), _relative(name, crowd, ordered), ".", color=COLOURS[1], label="each descent")
-        axes.plot(total, _relative(name, crowd, np.array(crowd.cost)), "s", color=COLOURS[2], label="followed")
+        axes.plot(total, _relative(name, crowd, np.array(crowd.cost)), "s", color=COLOURS[2], label="completed")
         axes.axhline(1.0 + ALIKE if name == "d-optimal" else 1.0 - ALIKE, color="#888888", linestyle=":", linewidth=0.8)
         axes.set(xscale="log", xlabel="number of starts n, or rank", title=TITLES[name])
         axes.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
@@ -429,16 +438,16 @@ def _run(full: bool, seed: int, store: Path | None, **options: Any) -> Result:
 
 STUDY = Study(
     "excitation",
-    "Compare manoeuvres by the posterior they lead to.",
+    "Compare manoeuvres by the posterior that they give.",
     run=_run,
     report=_report,
-    full="all criteria, the thorough effort of each search, every design flown",
+    full="all criteria, the thorough effort for each search, every design flown",
     seed=1,
     extra={
         "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
         "--starts": {"type": int, "help": "number of further descents by (26) and d-optimality"},
         "--searches": {"type": int, "help": "number of thorough searches by d-optimality that are compared"},
-        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        "--store": {"type": Path, "help": "file that stores the results of the searches, to resume an interrupted run"},
         **TRIALS,
     },
 )

@@ -1,4 +1,4 @@
-"""Faults: spoilt files, mistaken units and kills at random moments, and what the commands make of them."""
+"""Faults: corrupted files, wrong units and kills at random times, and how the commands respond to them."""
 
 from studies.faults.report import STUDY, Result, attempt, tasks
 

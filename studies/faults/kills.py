@@ -131,7 +131,7 @@ def kill_and_resume(command: str, folder: Path, rng: np.random.Generator, kills:
     first = _run(COMMANDS[command](folder, alone))
     taken = time.monotonic() - began
     if first.returncode:
-        raise RuntimeError(f"{command} fails where it is left alone: {first.stderr}")
+        raise RuntimeError(f"{command} fails even without a kill: {first.stderr}")
     running, broken = 0, []
     for moment in rng.uniform(0.0, taken, size=kills):
         running += _run_and_kill(COMMANDS[command](folder, killed), float(moment))
@@ -223,7 +223,7 @@ def answers_beside_another_version(study: Path, folder: Path) -> dict[str, bool]
     changed = other / "bayesid" / FILE
     text = changed.read_text()
     if text.count(OWN) != 1:
-        raise RuntimeError(f"{FILE} has no single {OWN}: say anew what the other version computes differently")
+        raise RuntimeError(f"{FILE} does not contain {OWN} exactly once: update the difference of the other version")
     changed.write_text(text.replace(OWN, OTHER))
     alone = _identified(here, study, folder / "alone", folder / "empty")
     theirs = _identified(other, study, folder / "theirs", folder / "cache")

@@ -45,7 +45,7 @@ Task = Mapping[str, Any]  # what is tried, and how often
 
 
 def tasks(full: bool) -> list[Task]:
-    """Return what is tried; the small study kills a campaign alone."""
+    """Return the trials; the small study kills only a campaign."""
     spoiling = [{"spoil": 100 + number, "changes": 250 if full else 50} for number in range(4 if full else 1)]
     killing = [{"kill": name, "kills": 8 if name == "campaign" else 3} for name in COMMANDS]
     if not full:
@@ -55,7 +55,7 @@ def tasks(full: bool) -> list[Task]:
 
 
 def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
-    """Try one thing, in a folder of its own."""
+    """Run one trial in a separate folder."""
     keep_compiled()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -109,7 +109,7 @@ NAMED = re.compile(r"\.(csv|toml|urdf): ")  # file in a message, with what follo
 
 @dataclass(frozen=True)
 class Result:
-    """Tasks with their results, and the messages of trials that failed themselves."""
+    """Tasks with their results, and the messages of failed trials."""
 
     made: Sequence[Made]
     failures: Sequence[str]
@@ -165,20 +165,20 @@ def run(
 def _report(result: Result) -> Report[Result]:
     planned, done = len(tasks(full=True)), len(result.made) + len(result.failures)
     numbers, units, killed = result.numbers, result.by("unit"), result.by("kill")
-    caption = "What became of the spoilt files, by kind of change."
+    caption = "Outcome of the corrupted files, by kind of change."
     return Report(
         title="Faults",
-        subtitle="Spoilt files, mistaken units, kills at random moments",
-        question="What do commands make of spoilt files, mistaken units and kills at random moments?",
-        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, "
+        subtitle="Corrupted files, wrong units, kills at random times",
+        question="How do commands respond to corrupted files, wrong units and kills at random times?",
+        answer=f"{numbers['faulty']} of {counted(sum(numbers.values()), 'corrupted file')} got an unclear answer. "
         f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
-        f"{sum(task['refused'] for task in units.values())} of {counted(len(units), 'mistaken unit')} "
+        f"{sum(task['refused'] for task in units.values())} of {counted(len(units), 'wrong unit')} "
         f"{'was' if len(units) == 1 else 'were'} refused; after {counted(result.kills, 'kill')} "
-        f"{sum(task['same'] for task in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
-        "run left alone.",
+        f"{sum(task['same'] for task in killed.values())} of {counted(len(killed), 'command')} gave the same result as "
+        "an uninterrupted run.",
         goals=_goals(result),
-        valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
-        "of the full study were made.",
+        valid=f"the files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} "
+        "trials of the full study were run.",
         full=done >= planned,
         figure=Picture(answer_figure(result.answers), caption) if result.spoilt else None,
         sections=[_failures, _kills, _said, _conditions],
@@ -195,44 +195,45 @@ def _failures(document: Document, result: Result) -> None:
     wrong += [f"A trial failed: {text}" for text in result.failures]
     document.items([_short(text) for text in wrong])
     if not wrong:
-        document.paragraph("Nothing in this run.")
+        document.paragraph("Nothing went wrong in this run.")
 
 
 def _kills(document: Document, result: Result) -> None:
     document.section("Kills")
     document.paragraph(
-        "A command is run alone, then killed with SIGKILL at moments drawn uniformly over the time that it took, and "
-        "called again until it ends. Compared are the names of all files, tables and JSON without times. Identify, "
-        "design, loop and campaigns go on from what they kept; diagnose keeps nothing and starts anew."
+        "Each command first runs without interruption. It is then killed with SIGKILL at times drawn uniformly over "
+        "that duration, and called again until it finishes. The comparison covers the names of all files, tables, and "
+        "JSON without times. Identify, design, loop and campaigns resume from stored results; diagnose stores nothing "
+        "and starts again."
     )
     rows = [
         [name, str(task["kills"]), str(len(task["half_written"])), "yes" if task["same"] else "no"]
         for name, task in result.by("kill").items()
     ]
     if rows:
-        header = ["command", "kills while it ran", "files half written", "same answer"]
-        add_number_table(document, header, rows, "Kills of every command, and what became of its results.")
+        header = ["command", "kills while running", "partly written files", "same result"]
+        add_number_table(document, header, rows, "Kills of each command and their effect on its results.")
 
 
 def _said(document: Document, result: Result) -> None:
     for key, section, title, caption in (
-        ("unit", "Mistaken units", "unit", "What the command check says of mistaken units."),
-        ("around", "Faults around a run", "fault", "What commands say of faults around a run."),
+        ("unit", "Wrong units", "unit", "Messages of the command check for wrong units."),
+        ("around", "Faults around a run", "fault", "Messages of commands for faults around a run."),
     ):
         said = [[name, "yes" if i["refused"] else "no", _short(i["said"])] for name, i in result.by(key).items()]
         if said:
             document.section(section)
-            document.table([title, "refused", "what the command says"], said, caption)
+            document.table([title, "refused", "message"], said, caption)
 
 
 def _conditions(document: Document, result: Result) -> None:
     document.section("Conditions")
     document.paragraph(
-        "MuJoCo makes the files. A spoilt file has one value replaced, text inserted, the end cut off, a line dropped "
-        "or repeated, or a byte changed, drawn by Hypothesis. It counts as refused where the exit status is 2, one "
-        "message begins with Error, nothing is written and Python warns of nothing. The full disk holds 16 kB. The "
-        "other version, whose cache an identification finds, computes a torque of the gravity gradient a hundred times "
-        "as large."
+        "MuJoCo generates the files. Hypothesis draws the corruption of a file: one value is replaced, text is "
+        "inserted, the end is cut off, a line is dropped or repeated, or a byte is changed. The file counts as refused "
+        "if the exit status is 2, one message begins with Error, nothing is written and Python gives no warning. The "
+        "full disk has a capacity of 16 kB. The other version, whose cache an identification reads, computes a "
+        "gravity-gradient torque a hundred times as large."
     )
 
 
@@ -245,25 +246,25 @@ def _goals(result: Result) -> list[Goal]:
     answers = {name: killed.get(name, {"kills": 0, "same": False}) for name in COMMANDS}
     goals = [
         (
-            "No unclear answer to a spoilt file",
+            "No unclear answer to a corrupted file",
             f"{numbers['faulty']} of {total}; {numbers['refused']} refused, {numbers['accepted']} accepted",
             not numbers["faulty"],
             total > 0,
         ),
         (
-            "No wrong unit in silence",
-            f"{refused} of {len(units)} refused, {named} with file and place",
+            "No wrong unit passes unnoticed",
+            f"{refused} of {len(units)} refused, {named} with file and location",
             refused == len(units),
             len(units) == len(SLIPS),
         ),
         (
-            "Nothing half written after a kill",
+            "No partly written file after a kill",
             f"{counted(len(broken), 'file')} after {counted(kills, 'kill')}",
             not broken,
             kills > 0,
         ),
         *(
-            (f"{name}: same answer after kills", counted(task["kills"], "kill"), task["same"], task["kills"] > 0)
+            (f"{name}: same result after kills", counted(task["kills"], "kill"), task["same"], task["kills"] > 0)
             for name, task in answers.items()
         ),
     ]
@@ -277,19 +278,19 @@ def _goals(result: Result) -> list[Goal]:
 def _refused(title: str, task: Made | None) -> Goal:
     text = f"{title}: one clear error"
     if task is None:
-        return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)
+        return Goal(text, "not run; see tests/test_faults.py", Verdict.NOT_TESTED)
     return Goal(text, "refused" if task["refused"] else "not refused", Verdict.of(task["refused"]))
 
 
 def _unmoved(task: Made | None) -> Goal:
     """Return the goal on a cache that another version filled."""
-    text = "a cache of another version: no effect"
+    text = "cache of another version: no effect"
     if task is None:
-        return Goal(text, "not tried; a damaged file of it: tests/test_kept_jit.py", Verdict.NOT_TESTED)
+        return Goal(text, "not run; for a damaged cache file see tests/test_kept_jit.py", Verdict.NOT_TESTED)
     if not task["differs"]:
-        return Goal(text, "the other version itself gives the same answer", Verdict.NOT_TESTED)
-    same = "same answer as" if task["same"] else "another answer than"
-    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(task["same"]))
+        return Goal(text, "not decisive: the other version gives the same result", Verdict.NOT_TESTED)
+    same = "same result as" if task["same"] else "different result than"
+    return Goal(text, f"{same} with an empty cache; the other version gives another result", Verdict.of(task["same"]))
 
 
 def _short(said: str) -> str:
@@ -315,10 +316,10 @@ def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
 
 STUDY = Study(
     "faults",
-    "What commands make of spoilt files, mistaken units and kills at random moments.",
+    "Test how commands respond to corrupted files, wrong units and kills at random times.",
     run=run,
     report=_report,
-    full="1,000 spoilt files, ten mistaken units, faults around a run, and kills of every command that takes long",
+    full="1,000 corrupted files, ten wrong units, faults around a run, and kills of every long-running command",
     seed=1,
     extra={**TRIALS, **MADE},
 )

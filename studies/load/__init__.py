@@ -1,4 +1,4 @@
-"""Section 4.2 of the paper, a load on the arm: found by a loop that keeps every limit, and beside what was printed.
+"""Section 4.2 of the paper, a load on the arm: identified by a loop within all limits, compared with printed values.
 
 ``python -m studies.load --full`` writes ``reports/load.pdf``.
 """

@@ -28,7 +28,7 @@ NOISE_FREE = 1e-6  # relative error to reach without noise
 # squared distance from the mean within which ten parameters lie with 99 %, in standard deviations
 REGION = float(chi2.ppf(0.99, 10))
 
-TITLES = {"loop": "arm known to 5 %", "exact": "arm known exactly"}  # what is known of the arm, the headline first
+TITLES = {"loop": "arm uncertain by 5 %", "exact": "arm known exactly"}  # what is known of the arm, the headline first
 
 # titles of the limits
 LIMIT_TITLES = {"tip_speed": "tip speed", "tip_rate": "tip rate", "base_rotation": "base rotation"}
@@ -59,40 +59,41 @@ def _goals(result: Result) -> list[Goal]:
     for name, flight in result.flights.items():
         mass, sd = abs(flight.error(-1)[MASS]), flight.relative(-1)[MASS]
         reached = (
-            f"{format_percent(mass, 2)} off with a sd of {format_percent(sd, 2)} after {len(flight.bodies)}; mass and "
-            f"moments {format_percent(flight.worst(-1)[0], 2)} off at worst"
+            f"error {format_percent(mass, 2)}, sd {format_percent(sd, 2)} after {len(flight.bodies)}; largest error of "
+            f"mass and moments {format_percent(flight.worst(-1)[0], 2)}"
         )
-        text = f"Load's mass known to {format_percent(loops.GOAL, 2)} within {loops.AT_MOST} manoeuvres, {TITLES[name]}"
+        goal = format_percent(loops.GOAL, 2)
+        text = f"Mass of the load: error and sd at most {goal} within {loops.AT_MOST} manoeuvres, {TITLES[name]}"
         rows.append(Goal(text, reached, Verdict.of(sd <= loops.GOAL and mass <= loops.GOAL)))
     rows.append(
         Goal(
-            "The loop flies every step and never ends in no go",
-            f"{len(loop.bodies)} manoeuvres flown, each within 99 % quantiles",
+            "The loop flies every step and never stops with a no-go",
+            f"{len(loop.bodies)} manoeuvres flown, all 99 % quantiles within the limits",
             Verdict.of(loop.status != "no-go"),
         )
     )
     trusted = sum(review["trusted"] for review in loop.reviews)
     rows.append(
         Goal(
-            "The model, which is right, is trusted after every manoeuvre, from a diagnosis of all recordings so far",
+            "The correct model is trusted after every manoeuvre, by a diagnosis of all recordings so far",
             f"after {trusted} of {len(loop.reviews)}",
             Verdict.of(trusted == len(loop.reviews)),
         )
     )
     for name, flight in result.flights.items():
         used = ", ".join(f"{LIMIT_TITLES[key]} {format_percent(part, 4)}" for key, part in flight.used.items())
-        text = f"Every limit kept in MuJoCo, {TITLES[name]}"
-        rows.append(Goal(text, f"used at most: {used}", Verdict.of(max(flight.used.values()) <= 1.0)))
+        text = f"Every limit satisfied in MuJoCo, {TITLES[name]}"
+        rows.append(Goal(text, f"largest share used: {used}", Verdict.of(max(flight.used.values()) <= 1.0)))
     for name, flight in result.flights.items():
         distance = flight.distance(-1)
         text = f"Truth within the 99 % region of the last posterior, ten parameters, {TITLES[name]}"
-        reached = f"squared distance {format_fixed(distance, 1)} where {format_fixed(REGION, 1)} is the limit"
+        reached = f"squared distance {format_fixed(distance, 1)}; limit {format_fixed(REGION, 1)}"
         rows.append(Goal(text, reached, Verdict.of(distance <= REGION)))
     error = result.iterations[-1].worst
     rows.append(
         Goal(
             "Without noise, relative error at most 10⁻⁶ after two iterations",
-            f"{format_number(error, 2)}, within the flight's rule, MuJoCo's steps {loops.TRUTH_STEP:g} s",
+            f"{format_number(error, 2)}, within the flight rule, MuJoCo step {loops.TRUTH_STEP:g} s",
             Verdict.of(error <= NOISE_FREE),
         )
     )
@@ -102,43 +103,44 @@ def _goals(result: Result) -> list[Goal]:
 def _report(result: Result) -> Report[Result]:
     loop, exact = result.flights["loop"], result.flights["exact"]
     reached, ideal = (format_quantity(flight.bodies[-1].mean[0], flight.bodies[-1].sd[0]) for flight in (loop, exact))
-    kept = "kept" if max(loop.used.values()) <= 1.0 else "did not keep"
+    within = "and satisfied every limit" if max(loop.used.values()) <= 1.0 else "but exceeded a limit"
     motion = loops.excitation().motion(result.iterations[-1].parameters)
     return Report(
         title="A load of 370 kg on ETS-VII",
         subtitle="Section 4.2 of Lampariello and Hirzinger (IDETC 2005)",
-        question="Does a loop that plans, flies and identifies find a load of 370 kg from a guess of 10 kg, safely?",
-        answer=f"From the guess of 10 kg the loop found {reached} kg in {len(loop.bodies)} manoeuvres that {kept} "
-        "every limit; the arm, known to 5 % of each link's mass, sets that uncertainty, for with the arm known exactly "
-        f"the same manoeuvres give {ideal} kg.",
+        question="Does a loop that plans, flies and identifies safely find a load of 370 kg from a guess of 10 kg?",
+        answer=f"From a guess of 10 kg the loop identified {reached} kg in {len(loop.bodies)} manoeuvres {within}. "
+        f"With the arm known exactly, the same manoeuvres give {ideal} kg: the uncertainty of 5 % (1 sigma) in each "
+        "link mass dominates the result.",
         goals=_goals(result),
-        valid="the base is known exactly and rests before each manoeuvre, the load is rigid and held rigidly, and "
-        "nothing but the gravity gradient acts, as the diagnosis of each step was to find.",
+        valid="the base is known exactly and rests before each manoeuvre, the load is rigid and rigidly attached, "
+        "and only the gravity gradient acts, which the diagnosis of each step had to confirm.",
         full=result.full,
         figure=Picture(
             _loop_figure(result.flights),
-            "Left: error and standard deviation (sd) of the load's mass over 370 kg after every manoeuvre. Right: "
-            "largest tip speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop "
-            "plans them for 99 % of what it holds possible.",
+            "Left: error and standard deviation (sd) of the load's mass, relative to 370 kg, after every manoeuvre; "
+            "uncertainties of the arm are 1 sigma of each link mass. Right: largest tip speed, tip rate and base "
+            "rotation in MuJoCo, relative to their limits; the loop plans them to satisfy the limits with 99 % "
+            "probability.",
         ),
         setup=Setup(
             robot=f"ETS-VII with the published base and a load of 370 kg on link 6; joints within ±{mission.REACH:g} "
             "rad.",
-            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load from "
-            "what the steps before told. At most 50 mm/s and 5 degrees per second at the tip, the flight's rule, and "
-            f"{loops.SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability.",
+            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load given "
+            "the results of the previous steps. At most 50 mm/s and 5 degrees per second at the tip, the flight rule, "
+            f"and {loops.SAFE.base_rotation:g} rad of base rotation, each with 99 % probability.",
             sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
-            known="The base, the orbit, the attitude at the start, and the arm to 5 % of the mass of each link.",
-            unknown=f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * loops.SPREAD):.0f} "
-            f"times larger or smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} "
-            "m/s²; the links.",
+            known="The base, the orbit, the initial attitude, and each link mass to 5 % (1 sigma).",
+            unknown="The load, with a prior about 10 kg whose 1-sigma range is a factor of "
+            f"{np.exp(2.0 * loops.SPREAD):.0f} either way; the initial rate; the bias ({format_number(BIAS)} m/s², 1 "
+            "sigma); the links.",
             replicates=f"One loop with one drawn arm; at most {loops.AT_MOST} manoeuvres. Posteriors are normal "
             "approximations.",
         ),
         picture=Picture(
             figures.robot_pose(loops.robot_with_load(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
-            "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; "
-            "the loop's own manoeuvres are not drawn.",
+            "ETS-VII with the load, at rest and halfway through the paper's manoeuvre, which is flown without noise. "
+            "The manoeuvres of the loop are not drawn.",
         ),
         sections=[_failures, _evidence],
         statements=_statements(result),
@@ -151,11 +153,11 @@ def _failures(document: Document, result: Result) -> None:
     loop = result.flights["loop"]
     floor = loops.robot_with_load().link("link6").inertial.mass * 0.05
     share = format_percent(floor / paper.TRUTH[MASS], 2)
-    left = format_number(float(loop.bodies[-1].sd[MASS]), 2)
+    remaining = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
-        f"A precision of {format_percent(loops.GOAL, 2)} is out of reach of any manoeuvre with this arm: link 6 and "
-        f"the load move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. "
-        f"After the last manoeuvre {left} kg are left."
+        f"No manoeuvre with this arm can reach a precision of {format_percent(loops.GOAL, 2)}: link 6 and the load "
+        f"move as one body, and 5 % of the link's mass is {format_number(floor, 2)} kg, {share} of the load. After the "
+        f"last manoeuvre the sd of the load's mass is {remaining} kg."
     )
     attempts = []
     for number, plan in enumerate(loop.plans, start=1):
@@ -179,10 +181,10 @@ def _failures(document: Document, result: Result) -> None:
         for value, away in zip(loop.chi2, loop.chi2_errors(), strict=True)
     )
     counts = joined(str(count) for count in dict.fromkeys(loop.samples))
-    due = " or ".join(format_number(float(np.sqrt(2.0 / count)), 2) for count in dict.fromkeys(loop.samples))
+    spread = " or ".join(format_number(float(np.sqrt(2.0 / count)), 2) for count in dict.fromkeys(loop.samples))
     document.paragraph(
-        f"Chi-square per sample of the loop's fits, {counts} samples each: {ratio}. Due is 1 ± {due}, and a little "
-        "less where a fit has many unknowns."
+        f"Chi-square per sample of the loop's fits, {counts} samples each: {ratio}. The expected value is 1 ± "
+        f"{spread}, slightly less for a fit with many unknowns."
     )
 
 
@@ -199,14 +201,14 @@ def _evidence(document: Document, result: Result) -> None:
         document,
         ["load", "true", "guess", "paper 1", "paper 2", *TITLES.values()],
         rows,
-        "The load as printed after the paper's two iterations, without noise, and posterior mean ± sd after the last "
-        "manoeuvre of the loop.",
+        "The load: printed values after the paper's two iterations, without noise, and posterior mean ± sd after the "
+        "last manoeuvre of the loop.",
     )
     document.figure(
         _error_figure(result.iterations),
-        "The paper's case repeated without noise, within the flight's rule: relative errors of the ten quantities, "
-        "those of products of inertia relative to the moments. MuJoCo flew the motion (27) that maximises (26) as "
-        "intended; least squares without prior.",
+        "The paper's case repeated without noise, within the flight rule: relative errors of the ten quantities; those "
+        "of the products of inertia are relative to the moments. MuJoCo flew the motion (27) that maximises (26) as "
+        "intended; the fit is least squares without a prior.",
     )
 
 
@@ -218,19 +220,20 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "A load of 370 kg is identified from a guess of 10 kg in two iterations (4.2).",
             Finding.CONFIRMED if second < printed[1] else Finding.REFUTED,
-            f"Without noise the worst relative error is {format_number(first, 2)} and then {format_number(second, 2)}, "
-            f"where the paper prints {format_percent(printed[0], 2)} and {format_percent(printed[1], 2)}.",
+            f"Without noise the largest relative error is {format_number(first, 2)} after one iteration and "
+            f"{format_number(second, 2)} after two; the paper prints {format_percent(printed[0], 2)} and "
+            f"{format_percent(printed[1], 2)}.",
         ),
         Statement(
-            "The second iteration shows a clear improvement (4.2).",
+            "The second iteration gives a clear improvement (4.2).",
             Finding.CONFIRMED if second < 0.1 * first else Finding.NOT_TESTABLE,
-            "Without noise one iteration already ends at the precision of the integration, so that there is hardly "
-            "anything to improve: the paper's first result was not a fit carried to its end.",
+            "Without noise the first iteration already reaches the precision of the integration, so little can be "
+            "improved: the paper's first result was not a converged fit.",
         ),
         Statement(
-            "The load's inertia, printed without the point it is about (4.2).",
+            "The load's inertia is printed without its reference point (4.2).",
             Finding.CONFIRMED if physical == [True, False] else Finding.NOT_TESTABLE,
-            "It is about the load's centre of mass: about the link's origin no rigid body has it.",
+            "The reference point is the load's centre of mass: about the link's origin no rigid body has this inertia.",
         ),
     ]
 
@@ -259,7 +262,7 @@ def _tables(result: Result) -> list[CsvTable]:
 @styled
 def _loop_figure(flights: dict[str, Flight]) -> Figure:
     """Draw the error and the standard deviation of the mass after every manoeuvre, and what it used of the limits."""
-    figure = wide_figure(2.6)
+    figure = wide_figure(2.7)
     left, right = figure.subplots(1, 2)
     for index, (name, flight) in enumerate(flights.items()):
         steps = np.arange(1, len(flight.bodies) + 1)
@@ -269,7 +272,7 @@ def _loop_figure(flights: dict[str, Flight]) -> Figure:
         left.plot(steps, 100.0 * np.array(sd), "-", color=colour, label=f"sd, {TITLES[name]}")
         left.plot(steps, 100.0 * np.array(error), "o", color=colour, markersize=4, label=f"error, {TITLES[name]}")
     left.axhline(100.0 * loops.GOAL, color="#888888", linestyle=":")
-    left.text(0.55, 110.0 * loops.GOAL, "wanted", fontsize=8, va="bottom")
+    left.text(0.55, 110.0 * loops.GOAL, "goal", fontsize=8, va="bottom")
     flown = next(iter(flights.values()))
     steps = np.arange(1, len(flown.bodies) + 1)
     left.set(yscale="log", xlabel="manoeuvre", ylabel="error or sd of the mass [%]", xlim=(0.5, steps[-1] + 0.5))
@@ -281,7 +284,7 @@ def _loop_figure(flights: dict[str, Flight]) -> Figure:
     right.set(xlabel="manoeuvre", ylabel="share of the limit [%]", ylim=(0.0, 145.0))
     right.set_xticks(steps)
     right.legend(loc="upper left", ncols=2)
-    shared_legend(figure, left, 4, place="outside lower center")
+    shared_legend(figure, left, 2, place="outside lower center")
     return figure
 
 
@@ -311,5 +314,5 @@ STUDY = Study(
     report=_report,
     full="the default effort of each search",
     seed=0,
-    extra={"--folder": {"type": Path, "default": Path("out/load"), "help": "folder that keeps the loop's files"}},
+    extra={"--folder": {"type": Path, "default": Path("out/load"), "help": "folder for the loop's files"}},
 )

@@ -1,4 +1,4 @@
-"""Peers: bayesid beside what its users would use instead, on the same density and on the same task."""
+"""Peers: bayesid compared with its alternatives, on the same density and on the same task."""
 
 from studies.peers.report import STUDY
 

@@ -47,8 +47,8 @@ class Case:
 CASES = {
     19: Case(0, True, "base and initial rates"),
     10: Case(0, False, "base, from rest"),
-    39: Case(2, True, "the same and two links"),
-    79: Case(6, True, "the same and the whole arm"),
+    39: Case(2, True, "base, initial rates and two links"),
+    79: Case(6, True, "base, initial rates and the whole arm"),
 }
 
 

@@ -123,7 +123,7 @@ class Planner:
 
         solution = root(miss, self.first.goal, tol=1e-9)
         if not solution.success:
-            raise RuntimeError(f"no path to the target was found: {solution.message}")
+            raise RuntimeError(f"the search for a path to the target failed: {solution.message}")
         return Swing(self.first.start, solution.x)
 
     @property
@@ -146,7 +146,8 @@ def miss_of(flown: FlownPose, target: FlownPose) -> tuple[float, float]:
     return float(1e3 * np.linalg.norm(flown[0] - target[0])), float(np.degrees(turn.magnitude()))
 
 
-STAGES = ("published ship", "identified ship")  # what the planner takes the ship for, before and after identification
+# what the planner takes the spacecraft for, before and after identification
+STAGES = ("published spacecraft", "identified spacecraft")
 
 # what is predicted: poses of base and end-effector, each with a region of position and one of rotation
 BODIES, KINDS = ("base", "tip"), ("position", "rotation")
@@ -275,7 +276,7 @@ def fitted(posterior: Posterior) -> tuple[Floats, Floats]:
         if np.abs(step).max() < SMALL:
             return z - step, covariance
         z, residual = _descended(posterior, z, step, residual)
-    raise RuntimeError(f"the fit still moves by {np.abs(step).max():.2g} prior deviations after {STEPS} steps")
+    raise RuntimeError(f"the fit still changes by {np.abs(step).max():.2g} prior deviations after {STEPS} steps")
 
 
 def _descended(posterior: Posterior, z: Floats, step: Floats, residual: Floats) -> tuple[Floats, Floats]:
@@ -286,7 +287,7 @@ def _descended(posterior: Posterior, z: Floats, step: Floats, residual: Floats) 
         if after @ after < before:  # false where it is not a number
             return z - size * step, after
         size *= 0.5
-    raise RuntimeError("the fit ends where no step leads to a smaller sum of squares")
+    raise RuntimeError("the fit stopped: no step reduces the sum of squares")
 
 
 @cache

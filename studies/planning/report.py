@@ -26,8 +26,11 @@ from studies.planning.analysis import BODIES, DRAWS, EXCURSION, KINDS, SHIPS, SP
 MANOEUVRES = "excitation-manoeuvres.csv"  # table of the study of excitation
 HEADLINE = next(iter(mission.ROWS))  # what is known of the arm in the headline
 
+# words for what is known of the arm
+ARMS = dict(zip(mission.ROWS, ("arm uncertain by 5 % (1 sigma)", "arm known exactly"), strict=True))
+
 # regions that are counted, by indices of body and kind; base and end-effector turn alike
-REGIONS = {(0, 0): "base's position", (1, 0): "end-effector's position", (1, 1): "rotation"}
+REGIONS = {(0, 0): "base position", (1, 0): "end-effector position", (1, 1): "rotation"}
 
 RISK = 0.05  # probability with which the counts of one stage are called wrong although all of its regions are right
 NARROW = 0.05  # half width of an interval above which a count decides nothing
@@ -49,16 +52,16 @@ def goals(result: Result) -> tuple[Goal, ...]:
         for stage, title in enumerate(STAGES):
             shares = {text: flown.share(stage, *index) for index, text in REGIONS.items()}
             reached = "; ".join(f"{text} {share}" for text, share in shares.items())
-            text = f"Regions of the {title} hold what they state, {format_percent(CONTENT)}, {row}"
+            text = f"{format_percent(CONTENT)} regions contain the flown pose as often as stated, {title}, {ARMS[row]}"
             rows.append(Goal(text, reached, _verdict(list(shares.values()))))
     for row, flown in result.rows.items():
         smaller = Share(int((flown.miss[:, 1] < flown.miss[:, 0]).all(axis=1).sum()), len(flown.miss))
-        text = f"The plan with the identified ship misses less, position and rotation, {row}"
+        text = f"The plan with the identified spacecraft has the smaller miss, position and rotation, {ARMS[row]}"
         rows.append(Goal(text, str(smaller), Verdict.of(smaller.interval[0] > 0.5)))
     speed, rate = result.course.largest("tip_speed"), result.course.largest("tip_rate")
     reached = f"{format_number(1e3 * speed)} mm/s and {format_number(float(np.degrees(rate)), 2)} degrees per second"
-    kept = Verdict.of(speed <= TIP_SPEED and rate <= TIP_RATE)
-    rows.append(Goal("The planned path keeps the flight's rule in MuJoCo", reached, kept))
+    within = Verdict.of(speed <= TIP_SPEED and rate <= TIP_RATE)
+    rows.append(Goal("The planned path satisfies the flight rule in MuJoCo", reached, within))
     return tuple(rows)
 
 
@@ -69,36 +72,35 @@ def _median(row: Row, stage: int, kind: int) -> str:
 def _report(result: Result) -> Report[Result]:
     row = result.rows[HEADLINE]
     before, after = (row.share(stage, 1, 0) for stage in range(len(STAGES)))
-    counts = ", ".join(f"{len(drawn.miss)} with the {known}" for known, drawn in result.rows.items())
+    counts = ", ".join(f"{len(drawn.miss)} with the {ARMS[known]}" for known, drawn in result.rows.items())
     return Report(
-        title="What a planner gains by identification",
+        title="What path planning gains from identification",
         subtitle="ETS-VII in MuJoCo; section 1.1.1 of the paper",
         question="How far from its target does a path planned in joint space end, before and after identification?",
-        answer=f"With the {HEADLINE} the end-effector misses its target by {_median(row, 0, 0)} mm and "
-        f"{_median(row, 0, 1)} degrees in the median before identification and by {_median(row, 1, 0)} mm and "
-        f"{_median(row, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
-        f"{before} and {after} of the flights.",
+        answer=f"The median miss of the end-effector is {_median(row, 1, 0)} mm after one identification manoeuvre and "
+        f"{_median(row, 0, 0)} mm before. The angles are {_median(row, 1, 1)} and {_median(row, 0, 1)} degrees "
+        f"({ARMS[HEADLINE]}); the predicted 95 % region of the position contains the end-effector in {after} and "
+        f"{before} of the flights.",
         goals=goals(result),
-        valid="the joints follow the plan exactly, nothing but the gravity gradient acts, and every path starts at "
-        "rest.",
+        valid="the joints follow the plan exactly, only the gravity gradient acts, and every path starts at rest.",
         full=result.full,
         figure=Picture(
             _miss_figure(result),
-            "Miss of the end-effector, distance from its target and angle, over the drawn ships: share of the ships "
-            "below a value. Solid: arm known to 5 %; dashed: arm known exactly.",
+            "Miss of the end-effector, distance from its target and angle, over the drawn spacecraft: share of "
+            f"spacecraft below a value. Solid: {ARMS[HEADLINE]}; dashed: arm known exactly.",
         ),
         setup=Setup(
-            robot=f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 "
-            f"%; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
-            manoeuvre=f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within "
-            "50 mm/s and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint "
-            f"excursions of {format_vector(EXCURSION, 2)} rad at first, at "
-            f"{format_number(1e3 * result.course.largest('tip_speed'))} mm/s at most.",
+            robot=f"ETS-VII with drawn bodies, 1 sigma {format_percent(2.0 * SPREAD)} of the base mass and 5 % of each "
+            f"link mass; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
+            manoeuvre="Identification: the d-optimal manoeuvre of the excitation study, "
+            f"{mission.DURATION:g} s within 50 mm/s and 5 degrees per second. Planned path: quintics from rest to rest "
+            f"in the same time, in the first plan with joint excursions of {format_vector(EXCURSION, 2)} rad and at "
+            f"most {format_number(1e3 * result.course.largest('tip_speed'))} mm/s.",
             sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
-            known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
-            unknown="The base and the links within these widths, the rate at the start, the bias within "
-            f"{format_number(BIAS)} m/s².",
-            replicates=f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} "
+            known="The orbit and its gravity gradient, the initial attitude, and the published spacecraft.",
+            unknown="The base and the links with these uncertainties, the initial rate, the bias "
+            f"({format_number(BIAS)} m/s², 1 sigma).",
+            replicates=f"Drawn spacecraft: {counts}, each with separate noise and bias. Each prediction has {DRAWS} "
             "draws; posteriors are normal in log-Cholesky coordinates about the mode.",
         ),
         outline=robot_outline(ets7(), START),
@@ -116,14 +118,14 @@ def _failures(document: Document, result: Result) -> None:
         missed = {text: int((~flown.inside[:, 1, body, kind]).sum()) for (body, kind), text in REGIONS.items()}
         worst = max(missed, key=lambda text: missed[text])
         texts.append(
-            f"{row.capitalize()}: the squared distance of the true base from the identified one is "
-            f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} where 10 are expected; after "
-            f"identification the regions of the {worst} hold least: {missed[worst]} of {len(flown.inside)} do not hold "
-            f"the flown one, where {format_fixed((1.0 - CONTENT) * len(flown.inside), 1)} are due."
+            f"{ARMS[row].capitalize()}: the mean squared distance of the true base from the identified one is "
+            f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} (expected: 10). After identification "
+            f"the {worst} regions have the lowest coverage: {missed[worst]} of {len(flown.inside)} do not contain the "
+            f"flown value (expected: {format_fixed((1.0 - CONTENT) * len(flown.inside), 1)})."
         )
     texts.append(
-        "The regions have the proportions of the draws' covariance and are as large as the draws want. The truth is a "
-        "draw of what the planner holds possible; a prior that is too narrow was not tried."
+        "The regions have the proportions of the draws' covariance and the size that contains 95 % of such draws. "
+        "The truth is a draw from the planner's prior; a prior that is too narrow was not tested."
     )
     document.items(texts)
 
@@ -140,7 +142,7 @@ def _evidence(document: Document, result: Result) -> None:
             ]
             sizes = [format_number(float(np.median(flown.size[:, stage, 1, kind])), 2) for kind in range(len(KINDS))]
             counts = [f"{flown.inside[:, stage, body, kind].sum()} of {len(flown.inside)}" for body, kind in REGIONS]
-            cells.append([row.removeprefix("arm "), title, *misses, *sizes, *counts])
+            cells.append([ARMS[row].removeprefix("arm "), title, *misses, *sizes, *counts])
     add_number_table(
         document,
         [
@@ -152,20 +154,20 @@ def _evidence(document: Document, result: Result) -> None:
             "95 %",
             "region [mm]",
             "[degrees]",
-            *(f"held, {text}" for text in ("base", "end-effector", "rotation")),
+            *(f"{text} inside" for text in ("base", "end-effector", "rotation")),
         ],
         cells,
-        "Miss of the end-effector, median and 95 % quantile over the ships; longest semi-axis of the predicted 95 % "
-        "regions of its pose, median; number of regions that held the flown pose: position of the base, position of "
-        "the end-effector, rotation.",
+        "Miss of the end-effector, median and 95 % quantile over the spacecraft; longest semi-axis of the predicted "
+        "95 % regions of its pose, median; number of regions that contain the flown pose: position of the base, "
+        "position of the end-effector, rotation.",
         words=2,
     )
     first, again = result.example
     for trip, title, colour in ((first, STAGES[0], BEFORE), (again, STAGES[1], AFTER)):
         document.figure(
             figures.final_positions({title: trip.predicted["tip"]}, trip.flown["tip"][0], (colour,)),
-            f"One ship, planned with the {title}: draws of the end-effector's final position and the outline of their "
-            "95 % ellipsoid, counted from where it truly ended.",
+            f"One example, planned with the {title}: draws of the end-effector's final position and the outline of "
+            "their 95 % ellipsoid, relative to the true final position.",
         )
 
 
@@ -174,15 +176,16 @@ def _statements(result: Result) -> list[Statement]:
     gain = float(np.median(headline.miss[:, 0, 0] / headline.miss[:, 1, 0]))
     return [
         Statement(
-            "A path planned in joint space for a final state in inertial space ends wrong if the parameters are "
+            "A path planned in joint space for a final state in inertial space misses it if the parameters are wrong "
             "(1.1.1).",
             Finding.CONFIRMED if np.median(headline.miss[:, 0, 0]) > 1.0 else Finding.REFUTED,
-            f"With the base known to {format_percent(2.0 * SPREAD)} the median miss is {_median(headline, 0, 0)} mm.",
+            f"With the base mass uncertain by {format_percent(2.0 * SPREAD)} (1 sigma), the median miss is "
+            f"{_median(headline, 0, 0)} mm.",
         ),
         Statement(
             "Identification has to be performed before any operational phase (1.1.1).",
             Finding.CONFIRMED if gain > 2.0 else Finding.REFUTED,
-            f"One manoeuvre makes the miss {format_number(gain, 2)} times smaller in the median. What miss an "
+            f"One manoeuvre reduces the miss by a factor of {format_number(gain, 2)} in the median. The miss that an "
             "operation allows is not stated.",
         ),
     ]
@@ -190,7 +193,7 @@ def _statements(result: Result) -> list[Statement]:
 
 def _table(result: Result) -> CsvTable:
     header = ["arm", "ship", "planned with", "miss [mm]", "miss [degrees]"]
-    header += [f"{body} {kind} held" for body in BODIES for kind in KINDS]
+    header += [f"{body} {kind} inside" for body in BODIES for kind in KINDS]
     lines = [
         [row, number, title, *map(float, flown.miss[number, stage]), *map(int, flown.inside[number, stage].ravel())]
         for row, flown in result.rows.items()
@@ -212,7 +215,7 @@ def _miss_figure(result: Result) -> Figure:
                 label = title if row == HEADLINE else None
                 axes.plot(values, share, line, color=(BEFORE, AFTER)[stage], label=label)
         axes.set(xscale="log", xlabel=f"miss [{unit}]")
-    panels[0].set_ylabel("share of ships")
+    panels[0].set_ylabel("share of spacecraft")
     shared_legend(figure, panels[0], len(STAGES))
     return figure
 
@@ -224,14 +227,18 @@ def _run(tables: Path, **options: Any) -> Result:
 
 STUDY = Study(
     "planning",
-    "Say what a planner gains by identification.",
+    "Quantify what path planning gains from identification.",
     run=_run,
     report=_report,
-    full=f"{SHIPS} drawn ships for each knowledge of the arm",
+    full=f"{SHIPS} drawn spacecraft for each uncertainty of the arm",
     seed=1,
     extra={
-        "--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of excitation"},
-        "--ships": {"type": int, "help": "number of drawn ships for each knowledge of the arm"},
+        "--tables": {
+            "type": Path,
+            "default": Path("reports"),
+            "help": "folder with the tables of the study excitation",
+        },
+        "--ships": {"type": int, "help": "number of drawn spacecraft for each uncertainty of the arm"},
         **TRIALS,
     },
     inputs=lambda options: [MODELS / "ets7.urdf", options.tables / MANOEUVRES],

@@ -35,13 +35,13 @@ SPREAD = ["bias", "bias error", "sd", "sd error", "rms", "rms error", "stated sd
 def _report(result: Result) -> Report[Result]:
     planned = motion()
     fastest, _ = tip_speed(planned, planned.duration)
-    haste = f"{format_fixed(fastest / TIP_SPEED, 1)} times as fast as the flight's rule permits"
+    haste = f"{format_fixed(fastest / TIP_SPEED, 1)} times as fast as the flight rule permits"
     return Report(
         title="Noise and sensor precision",
         subtitle="Section 4.3 of Lampariello and Hirzinger (IDETC 2005)",
-        question="Section 4.3 expects in three dimensions the error of 2 % that its reference had in the plane with "
-        "noise of sigma 0.04, leaves open what integrating the accelerometer does, and names sensors. What do noise "
-        "and sensors do to the identified base?",
+        question="Section 4.3 expects an error of 2 % in three dimensions, as its reference had in the plane with "
+        "noise of sigma 0.04. It names sensors, but not the effect of integrating the accelerometer. How do noise and "
+        "sensors affect the identified base?",
         answer=_answer(result),
         valid=f"the arm is known exactly, the tip moves {haste}, noise is white and independent, and the initial "
         "attitude is known. Errors are to first order about the truth, checked by nonlinear fits.",
@@ -50,21 +50,21 @@ def _report(result: Result) -> Report[Result]:
         figure=Picture(
             tables.level_figure(result),
             "Root mean square error of mass and worst moment after one manoeuvre, by level of noise, over "
-            f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last names state star sensor, "
-            "accelerometer [m/s²] and encoder [rad]. Grey: the 2 % of the paper.",
+            f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last labels give star tracker, "
+            "accelerometer [m/s²] and encoder [rad]. Grey: the paper's 2 %.",
         ),
         setup=Setup(
             robot="ETS-VII with the paper's base and a public arm, flown by an independent simulator (MuJoCo).",
             manoeuvre=f"The paper's optimum of (26) in {planned.duration:.0f} s, as in the report on the base body. "
-            f"The tip moves with {1e3 * fastest:.0f} mm/s, {haste}: errors at the permitted speed are larger (report "
+            f"The tip moves at {1e3 * fastest:.0f} mm/s, {haste}: errors at the permitted speed are larger (report "
             "on the base body).",
             sensors=f"Rates, accelerometer at {ACCELEROMETER} m and encoders, white noise every {INTERVAL:g} s. The "
             f"paper's sigmas {paper.SIGMAS[0]:g} and {paper.SIGMAS[1]:g} have no unit; both reports read them as "
             "degrees per second of the rates, degrees of the joints, and the same share of the accelerometer's peak. "
-            "'2″' is a star sensor whose attitude is differenced, taken for white.",
+            "'2″' is a star tracker whose attitude is differentiated; its noise is taken as white.",
             known="Orbit, arm and initial attitude. There is no prior.",
             unknown="Ten parameters of the base and the initial rate.",
-            replicates=f"{result.effort.draws} sets of noise, which all levels share but for its size; "
+            replicates=f"{result.effort.draws} sets of noise, the same at all levels except for its size; "
             f"{len(result.levels)} levels, {len(next(iter(result.joints.values())))} treatments of the joints.",
         ),
         picture=Picture(
@@ -86,7 +86,7 @@ def _report(result: Result) -> Report[Result]:
                 tables.refit_rows(result),
             ),
         ],
-        beside="Beside this report, relative to the truth: every estimator at every level, for joints, rates and "
+        beside="Tables with this report, relative to the truth: every estimator at every level, for joints, rates and "
         "accelerometer ({0}), the linear method ({1}), and the nonlinear fits ({2}).",
     )
 
@@ -109,9 +109,9 @@ def _answer(result: Result) -> str:
     best = result.joints[level][LIKELIHOOD]
     mass, moment = tables.equal_rms(result, level, PAPER)
     return (
-        f"With noise of {level} one manoeuvre gives the mass to {tables.rms_of(best, MASS)} % and the worst moment to "
-        f"{tables.rms_of(best, best.worst())} % by the package's likelihood, and to {mass} % and {moment} % by the "
-        "paper's procedure; the paper expects 2 %."
+        f"With noise of {level} one manoeuvre determines the mass to {tables.rms_of(best, MASS)} %; the paper expects "
+        f"2 %. The worst moment is determined to {tables.rms_of(best, best.worst())} %. Both are results of the "
+        f"package's likelihood; the paper's procedure gives {mass} % and {moment} %."
     )
 
 
@@ -123,7 +123,7 @@ def _goals(result: Result) -> list[Goal]:
     better = [name for name, spread in likelihood.items() if _both(spread) <= _both(result.accelerometers[name][PAPER])]
     return [
         Goal(
-            f"at {level} one manoeuvre gives mass and moments to {format_percent(PLANE)}, as the paper expects",
+            f"at {level} one manoeuvre determines mass and moments to {format_percent(PLANE)}, as the paper expects",
             f"{tables.rms_pair(likelihood[level])} %",
             Verdict.of(_both(likelihood[level]) <= PLANE),
         ),
@@ -133,9 +133,9 @@ def _goals(result: Result) -> list[Goal]:
             Verdict.of(len(better) == len(likelihood)),
         ),
         _honest("the package's likelihood", likelihood),
-        _honest("the same without samples near the junctions of (27)", careful),
+        _honest("the likelihood without samples near the junctions of (27)", careful),
         Goal(
-            "integrating the accelerometer loses nothing if its full covariance is used (ratio of sd at most "
+            "integrating the accelerometer loses no information if its full covariance is used (ratio of sd at most "
             f"{LOSS:g})",
             format_fixed(loss, 4),
             Verdict.of(loss <= LOSS),
@@ -150,7 +150,7 @@ def _honest(name: str, spreads: dict[str, Spread]) -> Goal:
     outside = [level for level in spreads if level not in inside]
     reached = f"{format_range(ratios.ravel(), 2)}; {len(inside)} of {len(spreads)} levels"
     return Goal(
-        f"actual over stated errors of mass and moments within {HONEST[0]:g} and {HONEST[1]:g} at every level: {name}",
+        f"actual over stated errors of mass and moments between {HONEST[0]:g} and {HONEST[1]:g} at every level: {name}",
         reached + (f"; not at {format_text('; '.join(outside))}" if outside else ""),
         _judged(ratios, errors),
     )
@@ -173,7 +173,7 @@ def _ratios(spreads: Mapping[str, Spread]) -> np.ndarray:
 
 
 def _negatives(document: Document, result: Result) -> None:
-    document.section("What goes wrong, and how far the numbers hold")
+    document.section("Failures, and validity of the numbers")
     level, standard = _first(result), _standard(result)
     uses, falsified = result.accelerometers[level], result.falsified
     equal, weighted = uses[EQUAL], uses[WEIGHTED]
@@ -181,16 +181,16 @@ def _negatives(document: Document, result: Result) -> None:
     ratio = float(equal.sd[k] / weighted.sd[k])
     error = ratio * float(np.hypot(*(spread.sd_error[k] / spread.sd[k] for spread in (equal, weighted))))
     texts = [
-        "The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, a jump "
-        "that the samples do not show biases its smoother. Actual over stated errors are "
+        "The package's likelihood: at the junctions of (27) the third derivative of the joint motion jumps, and a jump "
+        "that the samples do not resolve biases the smoother. The ratio of actual to stated errors is "
         f"{tables.honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
-        f"{tables.honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are left out.",
+        f"{tables.honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} without those samples.",
         *(_failing(result, name) for name, spreads in result.joints.items() if not _is_honest(_ratios(spreads))),
-        "Integrated as in (21), with velocities taken for white and equal weights, the accelerometer makes the worst "
-        f"moment {tables.percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ m/s² "
-        f"changes the mass by {format_percent(abs(float(falsified[EQUAL][MASS])), 2)} (as it reads: "
-        f"{format_percent(abs(float(falsified[WEIGHTED][MASS])), 2)}). With one unknown, in closed form, the variance "
-        f"is 3 times that of the accelerations (here {format_fixed(result.scalars[0].matrices ** 2, 2)}).",
+        "If the accelerometer is integrated as in (21), with equally weighted velocities that are taken as white, the "
+        f"worst moment is {tables.percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ "
+        f"m/s² changes the mass by {format_percent(abs(float(falsified[EQUAL][MASS])), 2)} (without integration: "
+        f"{format_percent(abs(float(falsified[WEIGHTED][MASS])), 2)}). For one unknown, the variance is 3 times that "
+        f"of the accelerations in closed form (computed: {format_fixed(result.scalars[0].matrices ** 2, 2)}).",
     ]
     if result.regressions:
         texts.append(_linear(result))
@@ -210,15 +210,15 @@ def _linear(result: Result) -> str:
         )
     )
     return (
-        f"The linear method (19) is biased, because its regressor is measured: at {level} central differences give a "
-        f"mass that is wrong by {raw} ({closed} in closed form), the best treatment ({name}) leaves {least}, and more "
-        "samples do not help."
+        f"The linear method (19) is biased because its regressor is measured. At {level} central differences give a "
+        f"mass error of {raw} ({closed} in closed form), and the best treatment ({name}) gives {least}. More samples "
+        "do not reduce the bias."
     )
 
 
 def _refits(result: Result) -> str:
     if not result.refits:
-        return "Whether first order holds was not tested: only the full study has nonlinear fits."
+        return "The first-order approximation was not tested: only the full study has nonlinear fits."
     diverged = [
         f"{int(refits.diverged.sum())} of {len(refits.diverged)} at {format_text(level)}"
         for level, procedures in result.refits.items()
@@ -226,10 +226,10 @@ def _refits(result: Result) -> str:
     ]
     gap = max(float(procedures[LIKELIHOOD].difference[JUDGED].max()) for procedures in result.refits.values())
     rough = [format_text(level) for level in result.refits if tables.diverging(result, level)]
-    consequence = f", so that its errors at {joined(rough)} are orders of magnitude only" if rough else ""
+    consequence = f", so its errors at {joined(rough)} are only orders of magnitude" if rough else ""
     return (
-        f"Nonlinear fits: by the paper's procedure {'; '.join(diverged)} diverge{consequence}. By the likelihood they "
-        f"differ from first order by a median of at most {format_fixed(gap, 2)} sd."
+        f"Nonlinear fits: with the paper's procedure {'; '.join(diverged)} diverge{consequence}. With the likelihood "
+        f"they differ from first order by a median of at most {format_fixed(gap, 2)} sd."
     )
 
 
@@ -237,16 +237,16 @@ def _failing(result: Result, level: str) -> str:
     """Return what is seen of the cause at a level where the likelihood does not state its errors rightly."""
     spread, exact = result.joints[level][LIKELIHOOD], result.joints[level][EXACT]
     text = (
-        f"At {format_text(level)} the likelihood's errors are {tables.honesty_of(spread)} times what it states, with a "
-        f"chi-square per degree of freedom of {format_fixed(float(spread.chi2.mean()), 2)}."
+        f"At {format_text(level)} the likelihood's errors are {tables.honesty_of(spread)} times the stated ones, with "
+        f"a chi-square per degree of freedom of {format_fixed(float(spread.chi2.mean()), 2)}."
     )
     if not _is_honest(exact.honesty[JUDGED]):
-        return f"{text} They are not stated rightly with exact joints either; the cause is not known."
+        return f"{text} The stated errors are wrong with exact joints too; the cause is not known."
     share = float((exact.rms[JUDGED] / spread.rms[JUDGED]).max())
     return (
         f"{text} With exact joints the ratio is {tables.honesty_of(exact)} and the errors are "
-        f"{format_percent(share, 1)} of these at most: what is not stated rightly is the noise of the encoders, as it "
-        "is carried over by the smoother. Why the smoother states it so is not known."
+        f"{format_percent(share, 1)} of these at most: the wrongly stated part is the noise of the encoders after the "
+        "smoother. The reason is not known."
     )
 
 
@@ -268,8 +268,8 @@ def _evidence(document: Document, result: Result) -> None:
             ]
             for level in result.levels
         ],
-        "Root mean square errors of the mass; of the worst moment [%]. Brackets hold the Monte-Carlo error of the last "
-        "digits; “about” stands where nonlinear fits by the paper's procedure diverge.",
+        "Root mean square errors of the mass; of the worst moment [%]. Brackets give the Monte-Carlo error of the last "
+        "digits; “about” marks levels at which nonlinear fits with the paper's procedure diverge.",
         columns("lrrrrr"),
     )
     standard = _standard(result)
@@ -277,7 +277,7 @@ def _evidence(document: Document, result: Result) -> None:
         ["treatment of the joints", "mass: bias", "sd", "moment: bias", "sd", "actual / stated"],
         tables.treatment_rows(result, standard),
         f"Treatments of the joints at {format_text(standard)}, base sensors as read [%]. Actual over stated errors are "
-        "the range over mass and moments; one is honest.",
+        "ranges over mass and moments; a calibrated treatment has 1.",
         columns("lrrrrr"),
     )
     shown = {name: result.joints[name] for name in SHOWN if name in result.joints}
@@ -299,19 +299,20 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "An error similar to 2 % can be expected in three dimensions after the same procedure.",
             Finding.CONFIRMED if _both(procedure) <= PLANE else Finding.REFUTED,
-            f"As the sigma is read here, one manoeuvre leaves {tables.equal_rms(result, level, PAPER)[1]} % in the "
-            f"worst moment by the paper's procedure. {_averaged(result.joints[level][EXACT], likelihood)}",
+            f"With sigma read as above, the error of the worst moment after one manoeuvre is "
+            f"{tables.equal_rms(result, level, PAPER)[1]} % with the paper's procedure. "
+            f"{_averaged(result.joints[level][EXACT], likelihood)}",
         ),
         Statement(
             "The accelerometer's signal must be integrated.",
             Finding.REFUTED,
-            "It can be compared as it reads. Integration loses nothing with the full covariance, and much without.",
+            "Integration is not necessary. It loses nothing with the full covariance, and much without it.",
         ),
         Statement(
             "Differentiating the joints twice can be improved by filtering.",
             Finding.CONFIRMED if len(honest) and not _is_honest(raw.honesty[JUDGED]) else Finding.REFUTED,
-            f"At {format_text(standard)} central differences are {tables.honesty_of(raw)} times as wrong as they "
-            f"state; honest {'is' if len(honest) == 1 else 'are'} {joined(honest) or 'none'}.",
+            f"At {format_text(standard)} the errors of central differences are {tables.honesty_of(raw)} times the "
+            f"stated errors. Calibrated treatments: {joined(honest) or 'none'}.",
         ),
         Statement(
             "The precision of the sensors is very important.",
@@ -329,18 +330,18 @@ def _averaged(exact: Spread, likelihood: Spread) -> str:
     stated = float(np.sqrt((exact.stated[:, JUDGED] ** 2).mean(axis=0)).max())
     fewest = np.ceil(max(1.0, (stated / PLANE) ** 2))
     return (
-        f"Noise averages: by the likelihood 2 % take {format_fixed(count, 0)} ± {format_fixed(error, 0)} such "
-        f"manoeuvres from the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} from the standard "
-        f"deviations to first order ({format_percent(stated, 2)} in the worst), as in the report on the base body."
+        f"Averaging reduces noise: with the likelihood 2 % require {format_fixed(count, 0)} ± {format_fixed(error, 0)} "
+        f"such manoeuvres by the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} by the "
+        f"first-order standard deviations (worst: {format_percent(stated, 2)}), as in the report on the base body."
     )
 
 
 STUDY = Study(
     "sensors",
-    "Verify what the paper expects of noise and sensors.",
+    "Test the paper's expectations for noise and sensors.",
     run=run,
     report=_report,
-    full="take all levels of noise, enough draws, and nonlinear fits: minutes",
+    full="all levels of noise, more draws, and nonlinear fits, which takes minutes",
     seed=1,
     extra=TRIALS,
 )

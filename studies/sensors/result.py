@@ -70,7 +70,7 @@ def run(
 
     Parameters
     ----------
-    effort : Effort, optional; effort in place of what ``full`` says
+    effort : Effort, optional; effort in place of that of ``full``
     """
     effort = effort or (FULL if full else SMALL)
     began = time.perf_counter()

@@ -1,6 +1,6 @@
-"""Two causes that a first manoeuvre cannot tell apart, and the manoeuvre designed to separate them.
+"""Two causes that a first manoeuvre cannot distinguish, and the manoeuvre designed to separate them.
 
-Momentum left in the wheels of a slowly drifting base makes a torque that is nearly constant; so does a leaking valve.
+Residual wheel momentum of a slowly drifting base gives a nearly constant torque, and so does a leaking valve.
 One of them is hidden with MuJoCo, both are fitted, and the Bayes factor is evaluated before and after the designed
 manoeuvre. ``python -m studies.separating`` writes ``reports/separating.pdf``.
 """

@@ -66,19 +66,19 @@ def goals(result: Result) -> tuple[Goal, ...]:
         share = _preferred(flown, LAST)
         rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share)))
         text = f"Hidden {NAMES[flown.truth]}: {analysis.FLIGHTS} sets of flights"
-        rows.append(Goal(text, f"{len(values)} made", Verdict.of(len(values) >= analysis.FLIGHTS)))
+        rows.append(Goal(text, f"{len(values)} flown", Verdict.of(len(values) >= analysis.FLIGHTS)))
     for truth in analysis.RIVALS:
         share = _shown(result, truth, LAST)
         percent = format_percent(SURE)
         text = (
-            f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {percent} of flights, "
-            f"in {percent} of the directions"
+            f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {percent} of flights "
+            f"for {percent} of the directions"
         )
         rows.append(Goal(text, str(share), _decided(share)))
     for flown in result.realised:
         gain = flown.factors[LAST] - flown.factors["first, d-optimal"]
         error = gain.std(ddof=1) / np.sqrt(len(gain))
-        text = f"Hidden {NAMES[flown.truth]}: the separating manoeuvre tells more than the d-optimal one"
+        text = f"Hidden {NAMES[flown.truth]}: the separating manoeuvre gives a higher ln B than the d-optimal one"
         reached = (
             f"ln B {format_fixed(abs(gain.mean()), 1)} ± {format_fixed(error, 1)} "
             f"{'higher' if gain.mean() > 0.0 else 'lower'}"
@@ -91,32 +91,32 @@ def goals(result: Result) -> tuple[Goal, ...]:
         for flown in result.realised
         for stage in analysis.STAGES
     ]
-    reached = f"{format_fixed(max(far), 1)} at most, {len(far)} means"
-    rows.append(Goal("Mean ln B within 3 standard errors of the expected", reached, Verdict.of(max(far) <= 3.0)))
+    reached = f"at most {format_fixed(max(far), 1)} over {len(far)} means"
+    rows.append(Goal("Mean ln B within 3 standard errors of the expected value", reached, Verdict.of(max(far) <= 3.0)))
     costs = [result.designs[name].costs["separation"] for name in ("separation", "d-optimal")]
     factor = format_number(float(np.exp(costs[1] - costs[0])), 3)
-    text = "By its own criterion the separating manoeuvre is the best of the two"
+    text = "By the separation criterion the separating manoeuvre is the better of the two"
     rows.append(Goal(text, f"smaller cost by a factor of {factor}", Verdict.of(costs[0] <= costs[1])))
     return tuple(rows)
 
 
 def _report(result: Result) -> Report[Result]:
-    parts = [
-        f"a hidden {NAMES[case.truth]} is preferred to its rival with a probability of {SURE:g} or more in "
-        f"{_counts(_preferred(case, LAST))} flights ({_counts(_preferred(case, 'first alone'))} with the first "
-        f"manoeuvre alone, {_counts(_preferred(case, 'first, d-optimal'))} with a d-optimal second one)"
-        for case in result.realised
-    ]
+    last, alone, optimal = (
+        " and ".join(f"{_counts(_preferred(case, stage))} flights ({NAMES[case.truth]})" for case in result.realised)
+        for stage in (LAST, "first alone", "first, d-optimal")
+    )
     titles = {"first": "first (the flight's)", "separation": "separating", "d-optimal": "d-optimal"}
     return Report(
-        title="Telling two causes apart",
+        title="Separating two causes",
         subtitle="A manoeuvre designed to separate rivals, ETS-VII in MuJoCo",
-        question="Wheels with momentum left and a leaking valve push a slowly drifting base alike. Does a second "
-        "manoeuvre that is designed to separate them decide which it is?",
-        answer=f"With the separating manoeuvre {' and '.join(parts)}.",
-        valid="one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
-        f"{format_percent(2.0 * analysis.SPREAD)} of its mass and drifts by a degree in a minute. The design knows "
-        "that rate.",
+        question="Residual wheel momentum and a leaking valve act alike on a slowly drifting base. Does a second "
+        "manoeuvre that is designed to separate them identify the true cause?",
+        answer=f"The separating manoeuvre identifies the hidden cause in {last}. An identified cause has a probability "
+        f"of {SURE:g} or more against its rival. The first manoeuvre alone identifies it in {alone}; with a d-optimal "
+        f"second one it is identified in {optimal}.",
+        valid="only one of the two acts, with the same size in both manoeuvres; the base mass is uncertain by "
+        f"{format_percent(2.0 * analysis.SPREAD)} (1 sigma) and the base drifts by one degree per minute. The design "
+        "uses that rate.",
         goals=goals(result),
         full=result.full,
         figure=Picture(
@@ -128,29 +128,28 @@ def _report(result: Result) -> Report[Result]:
         setup=Setup(
             robot=f"ETS-VII with the published base; joints within ±{mission.REACH:g} rad, wrist extended at the "
             "start.",
-            manoeuvre=f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at "
-            f"the 50 mm/s and 5 degrees per second of the flight's rule.{_left_out(result)}",
+            manoeuvre=f"{mission.DURATION:g} s each: first the manoeuvre of the flight, then quintic splines of all "
+            f"joints, at the 50 mm/s and 5 degrees per second of the flight rule.{_left_out(result)}",
             sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
-            known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
-            unknown=f"The base within {format_percent(2.0 * analysis.SPREAD)} of its mass, the rate "
-            f"{format_vector(analysis.DRIFT)} rad/s at the start, the bias within {format_number(BIAS)} m/s², the "
-            "links; and the cause, within 1 N m s of wheels, or 0.5 mN and 0.5 mN m of leak, per axis.",
-            replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias "
-            f"and noise of its own; {result.search.starts} starts for each design. Evidences are linearised about the "
-            "plan.",
+            known="Gravity gradient, initial attitude, and the arm with 5 % uncertainty (1 sigma) of each link mass.",
+            unknown=f"With 1 sigma: {format_percent(2.0 * analysis.SPREAD)} of the base mass, the bias "
+            f"({format_number(BIAS)} m/s²), the links, and the cause (1 N m s of wheels, or 0.5 mN and 0.5 mN m of "
+            f"leak, per axis); and the initial rate (true value {format_vector(analysis.DRIFT)} rad/s).",
+            replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with a separate arm, "
+            f"bias and noise; {result.search.starts} starts for each design. Evidences are linearised about the plan.",
         ),
         outline=robot_outline(ets7(), START),
         picture=Picture(
             manoeuvre_figure({title: result.motions[name] for name, title in titles.items()}),
-            "The manoeuvres: joints, speed of the tip with the rule dotted, and rotation of the base from rest.",
+            "The manoeuvres: joints, tip speed with the flight rule dotted, and rotation of the base from rest.",
         ),
         sections=[_failures, _evidence],
         statements=[
             Statement(
                 "The wheels' momentum and the initial rate are among the main causes of the drift (2.1).",
                 Finding.NOT_TESTABLE,
-                "The true momentum of ETS-VII's wheels is not public. That it can be told from a leak is shown here "
-                "for an assumed size.",
+                "The true momentum of ETS-VII's wheels is not public. This study separates it from a leak for an "
+                "assumed size only.",
             )
         ],
         tables=_tables(result),
@@ -161,25 +160,25 @@ def _left_out(result: Result) -> str:
     """Return which directions the separating manoeuvre was not designed for, for a sentence."""
     left_out = result.designs["separation"].left_out
     parts = [f"{count} of the {NAMES[label]}" for label, count in left_out.items()]
-    return f" Directions that no manoeuvre shows do not count in its design: {', '.join(parts)}." if parts else ""
+    return f" Its design omits directions that no manoeuvre resolves: {', '.join(parts)}." if parts else ""
 
 
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     texts = []
     for flown in result.realised:
-        shown = _counts(_shown(result, flown.truth, LAST))
+        resolved = _counts(_shown(result, flown.truth, LAST))
         low, middle = np.quantile([other.log_factor for other in result.directions[flown.truth, LAST]], [0.1, 0.5])
         texts.append(
-            f"Hidden {HIDDEN[flown.truth]}: the first manoeuvre alone shows the cause with ln B "
-            f"{format_fixed(flown.detected.mean(), 1)} against none. In random directions of the same size the "
-            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
-            f"and {format_fixed(low, 1)} at the lowest tenth; in {shown} directions it is above {RIVALRY} in "
+            f"Hidden {HIDDEN[flown.truth]}: the first manoeuvre alone detects the cause with a mean ln B of "
+            f"{format_fixed(flown.detected.mean(), 1)} against no cause. For random directions of the same size, the "
+            f"expected ln B over the rival with the separating manoeuvre has a median of {format_fixed(middle, 1)} and "
+            f"a 10 % quantile of {format_fixed(low, 1)}; for {resolved} directions it is above {RIVALRY} in "
             f"{format_percent(SURE)} of flights or more."
         )
     texts.append(
-        "The whole diagnosis, which has the catalogue to choose from, was not run here: the models have these two "
-        "causes alone. A leak that also pushes was not hidden."
+        "The full diagnosis with its catalogue was not run here: the models contain only these two causes. A leak with "
+        "a net force was not hidden."
     )
     document.items(texts)
 
@@ -206,14 +205,14 @@ def _evidence(document: Document, result: Result) -> None:
         ["hidden", "manoeuvres", *titles],
         rows,
         "λ is the energy of the hidden cause's signal in units of the noise, all other unknowns marginalised; λ(1−ρ²) "
-        "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Preferred: flights "
-        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same "
-        f"size in which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
+        "is the part that the rival cannot imitate. The expected ln B includes the cost of each prior. Preferred: "
+        f"flights with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the "
+        f"same size in which {format_percent(SURE)} of flights are expected above it, with ln B taken as normal.",
         columns("llrrrrrrrr"),
     )
     document.figure(
         _direction_figure(result),
-        "Expected ln B of causes of the same size in random directions, what each prior costs included: share of the "
+        "Expected ln B of causes of the same size in random directions, with the cost of each prior: share of the "
         f"directions below a value. The grey line is {RIVALRY}. The scale is linear between −1 and 1 and logarithmic "
         "beyond.",
     )
@@ -285,13 +284,13 @@ def _run(full: bool, seed: int, store: Path | None, **options: Any) -> Result:
 
 STUDY = Study(
     "separating",
-    "Tell apart what a first manoeuvre confuses.",
+    "Separate two causes that a first manoeuvre cannot distinguish.",
     run=_run,
     report=_report,
-    full=f"the thorough effort of each search, {analysis.FLIGHTS} sets of flights for each cause",
+    full=f"thorough searches, {analysis.FLIGHTS} sets of flights for each cause",
     seed=1,
     extra={
-        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        "--store": {"type": Path, "help": "file for the results of the searches, to resume an interrupted run"},
         "--flights": {"type": int, "help": "number of sets of flights for each cause"},
         "--trials": TRIALS["--trials"],
     },

@@ -33,7 +33,7 @@ DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "thro
 CALIBRATION = ("cal_device", "cal_proof")
 
 # throws that are not used, with the reason
-EXCLUDED = {"Empty_LOG00188": "its gyro is saturated; the folder of the measurements does not hold it"}
+EXCLUDED = {"Empty_LOG00188": "its gyro is saturated; the data folder does not contain it"}
 
 SIGNS = np.array([-1.0, -1.0, 1.0])
 RATE_SCALE = np.pi / 180.0 / 16.384
@@ -109,7 +109,7 @@ def read_truth(folder: Path) -> Truth:
     """
     file = folder / "truth.json"
     if not file.is_file():
-        raise InputError("the throws are not here: no truth.json", file=folder, remedy=_REMEDY)
+        raise InputError("the measured throws are missing: no truth.json", file=folder, remedy=_REMEDY)
     content = json.loads(file.read_text(encoding="utf-8"))
     proof, bodies = content["proof_body"], content["bodies"]
     tensors = {"cal_proof": proof["I_com"], **{name: body["I_com_grid"] for name, body in bodies.items()}}
@@ -223,7 +223,7 @@ def regress(recordings: Sequence[Recording], mass: float) -> InertialParameters:
         If the recordings do not hold the wheel's momentum.
     """
     if any("wheel_momentum.z" not in recording.channels for recording in recordings):
-        raise InputError("the wheel is not recorded", remedy="Its inertia sets the scale of the regression: record it")
+        raise InputError("the wheel is not recorded", remedy="Record it: its inertia sets the scale of the regression")
     left, right = (np.concatenate(parts) for parts in zip(*map(_euler, recordings), strict=True))
     xx, xy, xz, yy, yz, zz = np.linalg.lstsq(left, right, rcond=None)[0]
     place, reading = (np.concatenate(parts) for parts in zip(*map(_accelerometer, recordings), strict=True))

@@ -37,7 +37,7 @@ class GyroCross(Effect):
     """Cross-axis sensitivity of the gyro, a symmetric matrix without diagonal: the scale factors stay one."""
 
     name = "gyro-cross"
-    summary = "Each gyro axis reads a little of the two others."
+    summary = "Each gyro axis senses a small part of the other two."
 
     def __init__(self, sigma: float = 0.01) -> None:
         self.parameters = tuple(Parameter(axes, "1", sigma) for axes in ("xy", "xz", "yz"))
@@ -54,7 +54,7 @@ class GSensitivity(Effect):
     """Gyro that reads a little of the specific force: a full matrix, whose rows are the gyro's axes."""
 
     name = "g-sensitivity"
-    summary = "The gyro reads a little of the specific force."
+    summary = "The gyro senses a small part of the specific force."
 
     def __init__(self, sigma: float = 2e-4) -> None:
         self.parameters = tuple(Parameter(a + b, "rad s/m", sigma) for a in "xyz" for b in "xyz")
@@ -117,7 +117,7 @@ class WheelImbalance(Effect):
     """
 
     name = "wheel-imbalance"
-    summary = "The wheel is out of balance and shakes the body once in a turn."
+    summary = "The wheel is out of balance and shakes the body once per turn."
     per_recording = True
     states = 1
     constant_names = ("share",)
@@ -187,7 +187,7 @@ class SmoothTorque(Smooth):
     """Unexplained torque on the body."""
 
     name = "smooth-torque"
-    summary = "A smooth torque of unknown cause acts on the body, another one in every throw."
+    summary = "A smooth torque of unknown cause acts on the body, different in every throw."
     unit = "N m"
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
@@ -199,7 +199,7 @@ class SmoothForce(Smooth):
     """Unexplained specific force that the accelerometer reads, such as the drag of the air on a moving plate."""
 
     name = "smooth-force"
-    summary = "A smooth force of unknown cause acts on the body, another one in every throw."
+    summary = "A smooth force of unknown cause acts on the body, different in every throw."
     unit = "m/s2"
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:

@@ -76,11 +76,11 @@ def run(
 
     Parameters
     ----------
-    data : path, optional; of the measurements; beside the checkout where left out
+    data : path, optional; folder of the measurements, by default next to the checkout
     full : bool; all throws, and the diagnosis of every body
     reverse : bool
-        Whether to drop the recorded wheel from a throw of every body and to have it sought, which takes minutes more.
-    throws : int, optional; throws of each body; all in a full run and `QUICK` in a quick one where left out
+        Whether to remove the recorded wheel from one throw of every body and search for it, which takes minutes more.
+    throws : int, optional; throws of each body, by default all in a full run and `QUICK` in a quick one
 
     Raises
     ------
@@ -131,7 +131,7 @@ def goals_of(result: Result) -> list[Goal]:
         *(_quick_fit(body) for body in bodies if body.name in QUICK_FIT),
         _coverage(result),
         Goal(
-            "joint answer: formal over jackknife sd between 0.67 and 1.5 for every moment",
+            "joint fit: formal over jackknife sd between 0.67 and 1.5 for every moment",
             f"{min(ratios):.2f} to {max(ratios):.2f}",
             Verdict.of(min(ratios) >= 0.67 and max(ratios) <= 1.5),
         ),
@@ -142,12 +142,12 @@ def goals_of(result: Result) -> list[Goal]:
         ),
         Goal("a cause named on every body", *_full(result, f"{len(named)} of {len(studies)}", len(named))),
         Goal(
-            "extension predicts throws left out better",
+            "extension predicts omitted throws better",
             *_full(result, f"{len(better)} of {len(studies)} bodies", len(better)),
         ),
         *_reverse(result),
         Goal(
-            "whole run within 10 minutes, the search for the dropped wheel aside",
+            "whole run within 10 minutes, without the search for the removed wheel",
             f"{result.seconds / 60.0:.1f} minutes",
             Verdict.of(result.seconds <= SECONDS if studies else None),
         ),
@@ -157,9 +157,9 @@ def goals_of(result: Result) -> list[Goal]:
 def _quick_fit(body: BodyResult) -> Goal:
     """Return the goal on the mean size of the differences, which is uncertain by what throws differ."""
     goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
-    text = f"{body.name}: single throws differ from the stated moments by at most {goal:g} % in the mean, as a quick "
+    text = f"{body.name}: mean difference of single throws from the stated moments at most {goal:g} %, that of a quick "
     verdict = Verdict.between(mean - 2.0 * error, mean + 2.0 * error, most=goal)
-    return Goal(f"{text}least-squares fit does", f"{mean:.2f} ± {error:.2f} %", verdict)
+    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict)
 
 
 def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
@@ -172,7 +172,7 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
 def _coverage(result: Result) -> Goal:
     count, total = covered_in_all(result)
     low, high = Share(count, total).interval
-    text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
+    text = f"95 % intervals of single throws contain the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
     reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
     return Goal(text, reached, Verdict.between(low, high, LOW, HIGH))
 
@@ -180,9 +180,9 @@ def _coverage(result: Result) -> Goal:
 def _reverse(result: Result) -> list[Goal]:
     """Goals on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
     titles = (
-        "recorded wheel dropped: a wheel about z has a probability of "
+        "recorded wheel removed: a wheel about z has a probability of "
         f"{DEFAULT_SETTINGS.named_from:g} or more on every body",
-        "recorded wheel dropped: the verdict names a wheel on every body",
+        "recorded wheel removed: the verdict names a wheel on every body",
     )
     if not result.wheels:
         return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
@@ -205,13 +205,14 @@ def wheel_probability(diagnosis: Diagnosis) -> float:
 
 
 def _tables(result: Result) -> list[CsvTable]:
-    moments = ["model", "throw", "moment", "stated [kg m2]", "found [kg m2]", "formal sd [kg m2]"]
+    moments = ["model", "throw", "moment", "stated [kg m2]", "identified [kg m2]", "formal sd [kg m2]"]
     bodies = [
         *("body", "throws", "torque sd [N m]", "rms / sd of the torque", "force sd [m/s2]"),
         *(f"noise in flight / at rest, {axis}" for axis in AXES),
-        *("wheel [Hz]", "loudest order", "throws with it", "axis", "amplitude [m/s2]", "beside it [m/s2]", "force [N]"),
+        *("wheel [Hz]", "strongest order", "throws with it", "axis"),
+        *("amplitude [m/s2]", "half an order away [m/s2]", "force [N]"),
     ]
-    left = ["body", "channel", "rms", "rms at rest", "loudest [Hz]", *PHASES, *(f"imbalance, {p}" for p in PHASES)]
+    left = ["body", "channel", "rms", "rms at rest", "strongest [Hz]", *PHASES, *(f"imbalance, {p}" for p in PHASES)]
     device = [(name, _digits(mean), _digits(sd)) for name, (mean, sd) in result.extended.calibration.items()]
     tables = [
         CsvTable("moments", moments, _moment_rows(result)),
@@ -273,34 +274,34 @@ def _digits(value: float | np.floating) -> str:
 
 def _report(result: Result) -> Report[Result]:
     count, total = covered_in_all(result)
-    errors = " and ".join(
-        f"{body.mean_error:.2f} % ({body.name}, stated to {_uncertain(body)} %; rigid body: "
-        f"{result.plain.bodies[body.name].mean_error:.2f} %)"
-        for body in result.extended.bodies.values()
-    )
+    bodies = result.extended.bodies.values()
+    errors = " and ".join(f"{body.mean_error:.2f} % ({body.name})" for body in bodies)
+    stated = " and ".join(f"{_uncertain(body)} % ({body.name})" for body in bodies)
+    rigid = " and ".join(f"{result.plain.bodies[body.name].mean_error:.2f} % ({body.name})" for body in bodies)
     named = sum(bool(study.diagnosis.verdict.causes) for study in result.studies)
-    said = f", and a cause is named on {named} of {len(result.studies)} bodies" if result.studies else ""
+    causes = f" A cause is named on {named} of {len(result.studies)} bodies." if result.studies else ""
     return Report(
         title="Thrown bodies",
         subtitle="Real measurements of a small free-flying device with one reaction wheel",
-        question="How well does half a second of real flight tell the principal moments of inertia, do the intervals "
-        "hold, and does the diagnosis say what a rigid body with its wheel lacks?",
-        answer="Principal moments of single throws differ from the stated moments, which are uncertain themselves, by "
-        f"{errors} in the mean, {count} of {total} of their 95 % intervals hold the stated moments{said}.",
+        question="How well does half a second of real flight determine the principal moments of inertia, are the "
+        "intervals calibrated, and does the diagnosis identify what a model of a rigid body with its wheel lacks?",
+        answer=f"Single throws differ from the stated principal moments by {errors} on average. The stated moments are "
+        f"uncertain by {stated}; with a rigid body and its wheel alone the difference is {rigid}. Of the 95 % "
+        f"intervals, {count} of {total} contain the stated moments.{causes}",
         goals=goals_of(result),
         valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Four "
-        "choices were made while looking at these throws, so that this is no blind test.",
+        "choices were made with these throws in view, so this is not a blind test.",
         full=bool(result.studies and result.wheels),
         figure=Picture(
             throws_figure(result.plain, result.extended),
             "Errors of the principal moments in single throws, with formal standard deviations: a rigid body with its "
-            "wheel and nothing else (left), and with what the device and the air add (right). The grey band is the "
+            "wheel alone (left), and with the effects of the device and of the air (right). The grey band is the "
             "uncertainty of the stated moments.",
         ),
         setup=_setup(result),
         sections=[_failures, _bodies, _diagnosis, _residual_section],
         tables=_tables(result),
-        beside="Beside this report, in SI units: {all}.",
+        beside="Tables with this report, in SI units: {all}.",
         credit="Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; no measurement is reproduced here.",
     )
 
@@ -318,56 +319,56 @@ def _setup(result: Result) -> Setup:
     return Setup(
         robot="A device with one reaction wheel, alone (cal_device), on a box of known inertia (cal_proof), on a plate "
         "(Empty), and on the plate with blocks (A).",
-        manoeuvre="Thrown by hand and caught; the wheel spins up and down in flight. There is no rule of speed.",
+        manoeuvre="Thrown by hand and caught; the wheel spins up and down in flight. No speed limit applies.",
         sensors=f"Gyro, accelerometer and wheel speed, raw at 4 kHz. Samples every {1e3 * INTERVAL:g} ms are local "
-        "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured on quiet "
-        "stretches, by body and axis. Samples next to the largest accelerations of the wheel (12000 rad/s² within 4 "
-        "ms) and the last 20 ms are left out.",
-        known=f"Mass, and the stated moments, which are taken as uncertain by {100 * PLATE_SD:.0f} % for the plate "
-        f"(CAD) and by {100 * BLOCK_SD:.1f} % for what blocks add (our numbers). Inertias are relative to the wheel's, "
-        "which the box gives; the device is taken off with the parallel-axis theorem.",
-        unknown="Ten parameters of each body (prior of 100 % about a regression that needs its mass alone), cross-axis "
+        "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured in quiet "
+        "intervals, by body and axis. Samples next to the largest accelerations of the wheel (12000 rad/s² within 4 "
+        "ms) and the last 20 ms are omitted.",
+        known=f"Mass, and the stated moments, taken as uncertain by {100 * PLATE_SD:.0f} % for the plate (CAD) and by "
+        f"{100 * BLOCK_SD:.1f} % for the contribution of the blocks (our estimates). Inertias are relative to that of "
+        "the wheel, which the box calibrates; the device is subtracted with the parallel-axis theorem.",
+        unknown="Ten parameters of each body (prior of 100 % about a regression that needs only its mass), cross-axis "
         "terms of the gyro, tilt and delay of the wheel, drag, and a torque and a specific force per throw that are "
-        f"piecewise linear over 32 ms. In the diagnosis the body is known to {100 * SPREAD:g} % about the regression; "
-        "friction of the wheel's own axis and noise that depends on acceleration are no candidates.",
+        f"piecewise linear over 32 ms. In the diagnosis the prior width of the body is {100 * SPREAD:g} % about the "
+        "regression; friction of the wheel axis and noise that depends on acceleration are not candidates.",
         replicates=f"{sum(throws.values())} throws: {', '.join(f'{name} {count}' for name, count in throws.items())}. "
-        f"Left out: {excluded}.",
+        f"Omitted: {excluded}.",
     )
 
 
 def _failures(document: Document, result: Result) -> None:
-    document.section("What failed, and what cannot be told")
+    document.section("Failures and limits")
     plain = result.plain.bodies.values()
     both, total = covered_in_all(result, with_truth=True)
     factors = [factor.max() for factor in result.extended.noise.values()]
-    unsaid = [study.body for study in result.studies if not study.diagnosis.verdict.causes]
+    unnamed = [study.body for study in result.studies if not study.diagnosis.verdict.causes]
     texts = []
-    if unsaid:
+    if unnamed:
         texts.append(
-            f"No cause is named on {', '.join(unsaid)}: what the best known causes leave there is more than noise, and "
-            "the verdict is that it is unknown."
+            f"No cause is named on {', '.join(unnamed)}: the residual of the best catalogue causes is larger than "
+            "noise, and the verdict is unknown."
         )
     for study in result.studies:
         if study.body in result.plain.bodies:
             errors = (result.errors[model][study.body] for model in ("rigid", "extended"))
             rigid, extended = (" / ".join(format_signed(value) for value in row) for row in errors)
             texts.append(
-                f"{study.body}, from the one diagnosed throw: the three moments are wrong by {rigid} % with the rigid "
-                f"model and by {extended} % with the extension that was found."
+                f"{study.body}, from the one diagnosed throw: the errors of the three moments are {rigid} % with the "
+                f"rigid model and {extended} % with the identified extension."
             )
     texts += [
-        "A rigid body with its wheel and nothing else states standard deviations of single throws that are "
+        "With a rigid body and its wheel alone, the stated standard deviations of single throws are "
         f"{' and '.join(f'{body.inflation:.0f} times ({body.name})' for body in plain)} too small, by the scatter of "
         "the throws alone.",
-        "Four choices were made while looking at these throws: the delay of the wheel's reading, the wheel "
-        "acceleration beyond which samples are left out, that a smooth force is fitted beside the torque, and that the "
-        "noise in flight is scaled. The sizes of the last two follow from each body's throws by marginal likelihood; "
-        "the first two are constants of the reader.",
-        "Every throw of a body shares the error of its stated geometry and of the wheel's inertia. Intervals that "
-        f"count both hold {both} of {total}.",
-        f"In flight the samples vary about the smooth model by up to {format_fixed(min(factors), 1)} to "
-        f"{format_fixed(max(factors), 1)} times as much as quiet stretches do, by body.",
-        "The gyro's scale cannot be told from the wheel's inertia; a shift of the wheel's place is not a candidate.",
+        "Four choices were made with these throws in view: the delay of the wheel's reading, the wheel acceleration "
+        "beyond which samples are omitted, the smooth force that is fitted together with the torque, and the scaling "
+        "of the noise in flight. The sizes of the last two follow from each body's throws by marginal likelihood; the "
+        "first two are constants in the code that reads the data.",
+        "All throws of a body share the error of its stated geometry and of the wheel's inertia. Intervals that "
+        f"include both contain {both} of {total} moments.",
+        f"In flight the scatter of the samples about the smooth model is up to {format_fixed(min(factors), 1)} to "
+        f"{format_fixed(max(factors), 1)} times that of quiet intervals, depending on the body.",
+        "The gyro scale cannot be separated from the wheel's inertia; a displacement of the wheel is not a candidate.",
     ]
     for body, widths in result.extended.widths.items():
         if widths["smooth-torque"].doubtful:
@@ -408,7 +409,7 @@ def _bodies(document: Document, result: Result) -> None:
 def _diagnosis(document: Document, result: Result) -> None:
     if not result.studies:
         return
-    document.section("What the diagnosis says")
+    document.section("Results of the diagnosis")
     document.table(
         ["body", "verdict", "unknown", "most probable set", "chi-square", "gain", "wheel about z"],
         [
@@ -424,10 +425,10 @@ def _diagnosis(document: Document, result: Result) -> None:
             ]
             for study in result.studies
         ],
-        "The first throw of each body, diagnosed from its data alone: verdict, probability of something unknown, most "
-        "probable set of causes, chi-square per sample of the rigid model, and what the extension gains in log score "
-        "on throws left out, with the number of those that it predicts better. Last: the same throw without its "
-        "recorded wheel, probability of a wheel of unknown course about the right axis and the verdict.",
+        "The first throw of each body, diagnosed from its data alone: verdict, probability of an unknown cause, most "
+        "probable set of causes, chi-square per sample of the rigid model, and gain of the extension in log score on "
+        "omitted throws, with the number of throws that it predicts better. Last: the same throw without its recorded "
+        "wheel, with the probability of a wheel of unknown time history about the correct axis and the verdict.",
         columns("lllllll"),
     )
     if result.wheels:
@@ -435,10 +436,10 @@ def _diagnosis(document: Document, result: Result) -> None:
         unfitted = sum(diagnosis.bodies_fixed for diagnosis in result.wheels.values())
         chi2 = [diagnosis.gain.before.chi2_per_sample for diagnosis in result.wheels.values()]
         document.paragraph(
-            f"Without the recorded wheel a rigid body leaves chi-square per sample of {format_number(min(chi2), 2)} to "
-            f"{format_number(max(chi2), 2)}, and its fit diverges; on {unfitted} of {len(result.wheels)} bodies the "
-            f"body is held at its prior and causes are weighed along the motion that the data show. This took "
-            f"{minutes} minutes. The verdict is unknown wherever the named causes leave more than noise."
+            f"Without the recorded wheel, the chi-square per sample of a rigid body is {format_number(min(chi2), 2)} "
+            f"to {format_number(max(chi2), 2)}, and its fit diverges. For {unfitted} of {len(result.wheels)} bodies "
+            f"the parameters are fixed at the prior and causes are weighed along the measured motion. This took "
+            f"{minutes} minutes. The verdict is unknown wherever the residual of the named causes is larger than noise."
         )
 
 
@@ -455,13 +456,13 @@ def _dropped(result: Result, body: str) -> str:
 
 
 def _residual_section(document: Document, result: Result) -> None:
-    document.section("What stays unexplained")
+    document.section("Unexplained residual")
     document.items(shaking_words(result.extended.left, result.pairs))
     document.figure(
         residual_figure(result.extended.left),
-        "What is left, mean over throws. Left: amplitude of the residual of the samples; the bands are the recorded "
-        "wheel's frequency where it idles. Right: amplitude of the raw accelerometer at multiples of the recorded "
-        "wheel's frequency while it coasts at speed; the line is the loudest.",
+        "Residual, mean over throws. Left: amplitude of the residual of the samples; the bands mark the frequency of "
+        "the recorded wheel at idle. Right: amplitude of the raw accelerometer at multiples of the recorded wheel's "
+        "frequency while it coasts at speed; the line marks the strongest.",
     )
 
 
@@ -514,7 +515,7 @@ def residual_figure(left: Mapping[str, Residual]) -> Figure:
     panels[0][0].set_title("residual of samples")
     panels[0][1].set_title("raw readings, wheel at speed")
     panels[-1][0].set_xlabel("frequency [Hz]")
-    panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
+    panels[-1][1].set_xlabel("frequency / recorded wheel frequency")
     handles, labels = panels[0][1].get_legend_handles_labels()
     figure.legend(handles, [f"accelerometer {label}" for label in labels], loc="outside upper center", ncols=3)
     return figure
@@ -529,7 +530,10 @@ STUDY = Study(
     seed=1,
     extra={
         "--data": {"type": Path, "help": "folder of the measurements"},
-        "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw of every body and seek it"},
+        "--reverse": {
+            "action": "store_true",
+            "help": "remove the recorded wheel from one throw of every body and search for it",
+        },
     },
     inputs=lambda options: [(options.data or DEFAULT_FOLDER) / name for name in ("truth.json", "index.csv")],
 )

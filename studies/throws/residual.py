@@ -217,20 +217,20 @@ def shaking_words(left: Mapping[str, Residual], pairs: int) -> list[str]:
     loudest = [PHASES[int(np.nanargmax(residual.phase[:, axes[body]]))] for body, residual in left.items()]
     most = max(set(loudest), key=loudest.count)
     shaken = (
-        f"The wheel shakes the device: the raw accelerometer is loudest at {POLE_PAIRS}/{pairs} of the recorded "
-        f"wheel's frequency, a rule from the calibration throws ({counts[0]}) that {counts[1]} throws of the bodies "
-        "keep"
+        f"The wheel shakes the device: the strongest line of the raw accelerometer is at {POLE_PAIRS}/{pairs} of the "
+        f"recorded wheel's frequency, a ratio from the calibration throws ({counts[0]}) that is confirmed by "
+        f"{counts[1]} throws of the bodies"
     )
     if pairs != POLE_PAIRS:
         shaken += (
-            f". The motor seems to have {pairs} pairs of poles and not the {POLE_PAIRS} that the source of the data "
-            "states: it would turn more slowly than recorded. The inertias of bodies do not change, since the known "
-            "box gives the wheel's momentum; that of the wheel itself would be larger by the same factor"
+            f". The motor appears to have {pairs} pole pairs instead of the {POLE_PAIRS} stated by the source of the "
+            "data; the wheel would then turn more slowly than recorded. The inertias of the bodies do not change, "
+            "since the known box calibrates the wheel's momentum; its inertia would be larger by the same factor"
         )
     return [
         f"{shaken}.",
         f"The residual is largest while the wheel is {most} on {loudest.count(most)} of {len(left)} bodies, where it "
-        "passes the frequencies that samples every 5 ms let through. An imbalance of the size seen would leave "
-        f"{min(running):.1f} to {max(running):.1f} times as much there. Its force differs between bodies, which that "
-        "of one static imbalance would not.",
+        "passes through the frequencies that samples every 5 ms transmit. An imbalance of the observed size would give "
+        f"{min(running):.1f} to {max(running):.1f} times that residual. Its force differs between bodies, unlike that "
+        "of a single static imbalance.",
     ]

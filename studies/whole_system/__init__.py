@@ -1,8 +1,8 @@
 """Problem 3 of the paper: the inertial parameters of every body of ETS-VII and of the load in its hand.
 
-The study asks what each manoeuvre and each sensor teaches beyond the drawings, what must be known, and what restores
+The study determines what each manoeuvre and each sensor adds to the drawings, what must be known, and what restores
 the scale of the masses. It identifies all bodies, from motion alone and with joint torques, checks whether the stated
-uncertainty holds the truth, and applies the paper's linear regressor method to the same data. An independent simulator
+uncertainty covers the truth, and applies the paper's linear regressor method to the same data. An independent simulator
 flies the manoeuvres. ``python -m studies.whole_system --full`` writes ``reports/whole_system.pdf``.
 """
 

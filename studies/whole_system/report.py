@@ -49,40 +49,40 @@ CHIEF = (("six joints", Sensors.MOTION), ("six joints", Sensors.TORQUES), ("six 
 def _report(result: Result) -> Report[Result]:
     motion, torques, thrust = (_percents(_known(result, *case))[3] for case in CHIEF)
     # widths at the permitted speed are larger
-    haste = f"{format_fixed(result.hand_speed / TIP_SPEED, 1)} times as fast as the flight's rule permits"
+    haste = f"{format_fixed(result.hand_speed / TIP_SPEED, 1)} times as fast as the flight rule permits"
     drawn = ""
     if result.coverage is not None:
-        drawn = f" {len(result.coverage.distances)} systems drawn from the prior, each on its own manoeuvre."
+        drawn = f" {len(result.coverage.distances)} systems drawn from the prior, each on a separate manoeuvre."
     return Report(
         title="The whole system identified",
         subtitle="Problem 3 of Lampariello and Hirzinger (IDETC 2005)",
-        question="ETS-VII holds a load of 120 kg and the ten inertial parameters of no body are known exactly: what "
-        "does one manoeuvre teach, with which sensors, and what must be known?",
-        answer="Motion alone fixes ratios of masses and not their scale, which stays known as the drawings know it "
-        f"(whole system: {motion}); joint torques bring it to {torques} and a known thrust to {thrust}, with a "
-        f"manoeuvre that moves the tip {haste}.",
+        question="ETS-VII carries a load of 120 kg and no body has exactly known inertial parameters: what does one "
+        "manoeuvre determine, with which sensors, and what must be known?",
+        answer=f"Joint torques determine the mass of the whole system to {torques}, and a known thrust to {thrust}. "
+        f"Motion alone determines mass ratios but not their scale, which comes from the drawings (whole system: "
+        f"{motion}). The manoeuvre moves the tip {haste}.",
         valid=f"the tip moves {haste}, joints follow their path, the load is rigid and noise is white; widths are "
-        "linearised about the truth unless they are said to be sampled.",
+        "linearised about the truth unless marked as sampled.",
         goals=_goals(result),
         full=result.coverage is not None,
         figure=Picture(
             _mass_figure(result),
             "Relative standard deviation of four masses after one manoeuvre with six joints: from the drawings, from "
-            "motion, with joint torques (friction unknown), and with a known thrust in place of torques.",
+            "motion, with joint torques (friction unknown), and with a known thrust instead of torques.",
         ),
         setup=Setup(
             robot="ETS-VII with a rigid load of 120 kg on link 6, flown by an independent simulator (MuJoCo) with "
             "gravity gradient on every body.",
             manoeuvre=f"{result.duration:g} s of three sines between 0.02 and 0.06 Hz in each joint. The end-effector "
-            f"moves with up to {1e3 * result.hand_speed:.0f} mm/s relative to the base, {haste}; no row has the "
-            "permitted speed. The known thrust has two pulses of 20 N over 2 s.",
+            f"moves at up to {1e3 * result.hand_speed:.0f} mm/s relative to the base, {haste}; no case has the "
+            "permitted speed. The known thrust has two pulses of 20 N, 2 s each.",
             sensors=f"At 2 Hz, noise per sample: rate {format_number(RATE)} rad/s, accelerometer "
             f"{format_number(ACCEL)} m/s², encoders {format_number(ENCODER)} rad; joint torques, where measured, "
             f"{format_number(TORQUE)} N m.",
-            known="Kinematics and orbit. Drawings state every link to 5 % of its mass.",
-            unknown=f"All 80 parameters: base to {200 * BASE_SPREAD:g} % of its mass, load to {200 * LOAD_SPREAD:g} %, "
-            f"initial rate; friction of every joint where torques are measured (truly {COULOMB:g} N m dry and "
-            f"{VISCOUS:g} N m s viscous).",
+            known="Kinematics and orbit. The drawings give each link mass to 5 % (1 sigma).",
+            unknown=f"All 80 parameters, 1 sigma {200 * BASE_SPREAD:g} % of the base mass and {200 * LOAD_SPREAD:g} % "
+            f"of the load mass; the initial rate; friction of every joint where torques are measured (true values "
+            f"{COULOMB:g} N m dry and {VISCOUS:g} N m s viscous).",
             replicates=f"{len(result.methods[0].errors)} recordings of one flight for the comparison of "
             f"methods.{drawn}",
         ),
@@ -97,9 +97,9 @@ def _report(result: Result) -> Report[Result]:
             ),
             CsvTable("bodies", ["sensors", "body", "quantity", "truth", "drawings", "mean", "sd"], _body_rows(result)),
         ],
-        beside="Beside this report: what one exactly known body gives where no drawings help ({0}), and every sampled "
-        "parameter ({1}). The linear method differentiates rates with local cubics and weights every equation by its "
-        "residuals; the integral method is the mode of the posterior, whose fits start at the truth.",
+        beside="Tables with this report: the gain from one exactly known body without drawings ({0}), and every "
+        "sampled parameter ({1}). The linear method differentiates rates with local cubics and weights every equation "
+        "by its residuals; the integral method is the mode of the posterior, whose fits start at the truth.",
     )
 
 
@@ -127,10 +127,10 @@ def _goals(result: Result) -> list[Goal]:
         )
     texts = (
         f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} "
-        "over their number) and three methods agree",
-        f"squared distances over drawn systems are chi-square (Kolmogorov-Smirnov p at least {LEVEL:g})",
-        f"beyond the {format_percent(TAIL)} quantile, and below that of {format_percent(1.0 - TAIL)}, no more of them "
-        f"than chance allows (two-sided p at least {LEVEL:g})",
+        "divided by their number) and three methods agree",
+        f"squared distances over drawn systems follow chi-square (Kolmogorov-Smirnov p at least {LEVEL:g})",
+        f"distances beyond the {format_percent(TAIL)} quantile or below the {format_percent(1.0 - TAIL)} quantile: no "
+        f"more than chance allows (two-sided p at least {LEVEL:g})",
     )
     if result.coverage is None:
         return [*goals, *(Goal(text, "not run", Verdict.NOT_TESTED) for text in texts)]
@@ -153,32 +153,32 @@ def _well_sized(cases: Sequence[Sampled]) -> bool:
 
 
 def _negatives(document: Document, result: Result) -> None:
-    document.section("What goes wrong, and what cannot be had")
+    document.section("Failures and limits")
     motion, torques, _ = (_known(result, *case) for case in CHIEF)
     linear = next(method for method in result.methods if method.title == "regressors, motion alone")
     system = 1.0 + float(linear.errors[:, 3].mean())
     texts = [
-        "The paper's linear regressor method (19) on motion alone estimates a whole system of "
-        f"{format_percent(system, 2)} of the true mass and states "
-        f"{format_percent(float(linear.believed[:, 3].mean()), 2)} as its standard deviation. Its right side is zero: "
-        "the data know nothing of the scale, and the noise of the entries counts as evidence for small masses, the "
-        "more so the longer the recording. Only the prior holds them up.",
-        f"Of the 80 directions in which the bodies could differ the data halve the width of {motion.contraction} "
-        f"(motion) or {torques.contraction} (with torques); the others keep their prior.",
+        "With motion alone, the paper's linear regressor method (19) estimates the mass of the whole system as "
+        f"{format_percent(system, 2)} of its true value and states a standard deviation of "
+        f"{format_percent(float(linear.believed[:, 3].mean()), 2)}. Its right side is zero, so the data contain no "
+        "information about the scale. The noise of the entries acts as evidence for small masses, and more so in "
+        "longer recordings. Only the prior prevents smaller estimates.",
+        f"The bodies can differ in 80 directions. The data at least halve the width of {motion.contraction} (motion) "
+        f"or {torques.contraction} (with torques); the others remain closer to the prior.",
     ]
     for case in result.cases:
         texts += list(case.result.disagreements)
     if result.cases:
         texts.append(_distances(result))
     if result.coverage is None:
-        texts.append("Sampled posteriors and coverage were not tested: only the full study has them.")
+        texts.append("Sampled posteriors and coverage were not tested: only the full study includes them.")
     else:
         coverage = result.coverage
         count, inside = len(coverage.distances), (np.abs(coverage.scores) < 1.0).sum(axis=0)
         cells = ", ".join(f"{name} {number}" for name, number in zip(SCORED, inside, strict=True))
         texts.append(
-            f"Coverage of masses within one standard deviation, of {count} drawn systems: {cells}, where "
-            f"{CONTENT * count:.0f} ± {np.sqrt(count * CONTENT * (1.0 - CONTENT)):.0f} are expected. The mean squared "
+            f"Masses within one standard deviation in {count} drawn systems: {cells} (expected: "
+            f"{CONTENT * count:.0f} ± {np.sqrt(count * CONTENT * (1.0 - CONTENT)):.0f}). The mean squared "
             f"distance is {coverage.distances.mean():.1f} ± {np.sqrt(2.0 * coverage.unknowns / count):.1f} for "
             f"{coverage.unknowns} unknowns."
         )
@@ -190,16 +190,16 @@ def _distances(result: Result) -> str:
     seen = ", ".join(f"{format_fixed(case.distance, 1)} ({case.title})" for case in result.cases)
     unknowns = 10 * len(bodies(result.truth))
     return (
-        f"Squared distance of the truth from the sampled posteriors: {seen}, where {unknowns} ± "
-        f"{np.sqrt(2.0 * unknowns):.0f} are due. All share one truth and one set of drawings; where the data teach "
-        "nothing, the distance is that between these two."
+        f"Squared distance of the truth from the sampled posteriors: {seen}; expected: {unknowns} ± "
+        f"{np.sqrt(2.0 * unknowns):.0f}. All cases share one truth and one set of drawings; in directions that the "
+        "data do not determine, the distance is that between these two."
     )
 
 
 def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     document.table(
-        ["manoeuvre", "sensors", "directions learnt", *GROUPS],
+        ["manoeuvre", "sensors", "directions determined", *GROUPS],
         [
             [name, sensors.value[0], str(knowledge.contraction), *_percents(knowledge)]
             for name, information in result.known.items()
@@ -220,14 +220,14 @@ def _evidence(document: Document, result: Result) -> None:
             if group in ("base", "whole system")
         ],
         f"Linear regressors against the integral of the motion, relative errors over {count} recordings of one flight "
-        "with fresh noise. The truth is fixed, so that the mean error includes that of the drawings; the stated "
+        "with independent noise. The truth is fixed, so the mean error includes that of the drawings; the stated "
         "standard deviation (sd) covers both.",
         columns("llrrr"),
     )
     document.figure(
         _shrinkage_figure(result.known["six joints"]),
-        "What six moving joints teach of each log-Cholesky coordinate of each body: one minus the ratio of posterior "
-        "to prior width. Where a cell is white, the posterior is the prior.",
+        "Information from six moving joints about each log-Cholesky coordinate of each body: one minus the ratio of "
+        "posterior to prior width. In a white cell the posterior is the prior.",
     )
     if result.coverage is not None:
         document.figure(
@@ -277,18 +277,18 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "The linear method needs joint torques and friction: with a right side of zero it is badly posed (3).",
             Finding.CONFIRMED if bias > FAR else Finding.REFUTED,
-            f"On motion alone it is {format_number(bias, 2)} of its own standard deviations wrong.",
+            f"With motion alone its error is {format_number(bias, 2)} of its stated standard deviations.",
         ),
         Statement(
-            "Part of the system must be known to identify the whole (5).",
+            "Identification of the whole system requires a known part (5).",
             Finding.CONFIRMED if gain > 2.0 else Finding.REFUTED,
-            f"From motion alone. Joint torques are {format_number(gain, 2)} times better and need no drawings: without "
-            f"any they tell the whole to {format_percent(vague.mass(*system)[1], 2)}.",
+            f"With motion alone. Joint torques are {format_number(gain, 2)} times more precise and need no drawings: "
+            f"without any they determine the mass of the whole system to {format_percent(vague.mass(*system)[1], 2)}.",
         ),
         Statement(
             "The arm is known from CAD data, generally to 5 % (1).",
             Finding.NOT_TESTABLE,
-            "Taken as stated: 5 % of each mass.",
+            "Used as stated: 5 % of each mass.",
         ),
     ]
 

@@ -144,7 +144,7 @@ def record(truth: Truth, robot: Robot, name: str, rng: np.random.Generator | Non
 class Sensors(Enum):
     """Sensors in use, each with its title and the number of columns of the whitened residual that they fill."""
 
-    RATE = ("star sensor's rate", 3)
+    RATE = ("star tracker rate", 3)
     MOTION = ("rate and accelerometer", 6)
     TORQUES = ("rate, accelerometer, joint torques", None)
 

@@ -32,7 +32,7 @@ class StudyCheck(ShortForm):
     recordings : tuple of RecordingCheck
         Sampling, noise and likely mistakes of each recording.
     conventions : tuple of Convention
-        What the recordings take otherwise than declared.
+        Conventions of the recordings that differ from the declared ones.
     """
 
     title: str
@@ -41,8 +41,8 @@ class StudyCheck(ShortForm):
     conventions: tuple[Convention, ...] = ()
 
     def summary(self) -> Summary:
-        """Return what is conspicuous, a sentence for each recording."""
-        quiet = "See the conventions." if self.conventions else "Nothing conspicuous."
+        """Return the warnings, one line per recording."""
+        quiet = "See the conventions." if self.conventions else "No warnings."
         return Summary(
             [
                 f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or quiet)
@@ -61,7 +61,7 @@ class StudyCheck(ShortForm):
 
 
 def check(study: StudySource | Posterior, *, progress: Progress = silent) -> StudyCheck:
-    """Check a study and its recordings: rates, gaps, noise, clocks, joints that hardly move.
+    """Check a study and its recordings: rates, gaps, noise, clocks, and joints that hardly move.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def check(study: StudySource | Posterior, *, progress: Progress = silent) -> Stu
     Raises
     ------
     InputError
-        If a file is absent, a rule is broken or numbers cannot be in the units of the format.
+        If a file is missing, a rule is violated or values cannot be in the units of the format.
     """
     study = study if isinstance(study, Posterior) else study_of(study)
     if isinstance(study, Posterior):

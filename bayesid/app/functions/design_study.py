@@ -33,7 +33,7 @@ class Designs(ShortForm):
     manoeuvres : tuple of Design
         The best manoeuvre by each criterion.
     best : Design
-        That which leaves the smallest uncertainty.
+        Manoeuvre with the smallest predicted uncertainty.
     """
 
     title: str
@@ -47,7 +47,7 @@ class Designs(ShortForm):
         return {"title": self.title, "seed": self.seed, "manoeuvres": manoeuvres, "best": self.best.name}
 
     def summary(self) -> Summary:
-        """Return what each manoeuvre reaches, and which is best."""
+        """Return the result of each manoeuvre, and which is best."""
         return Summary(design_sentences(self.manoeuvres, self.best))
 
 
@@ -77,7 +77,7 @@ def design(
     store: Store | None = None,
     progress: Progress = silent,
 ) -> Designs:
-    """Design manoeuvres by the study's criteria, within its limits.
+    """Design manoeuvres by the study's criteria within its limits.
 
     Parameters
     ----------
@@ -85,26 +85,26 @@ def design(
     seed : int
         Seed of all random numbers.
     starts : int
-        Number of random starts for every criterion.
+        Number of random starts per criterion.
     iterations : int
-        Most iterations of the optimiser from each.
+        Maximum number of optimiser iterations per start.
     thorough : bool
-        Whether to search on between the best motions, which takes about five times as long.
+        Whether to continue the search between the best motions; this takes about five times as long.
     separate : tuple of two str, optional
-        Labels of two effects that the manoeuvre is to tell apart, in place of the study's criteria.
+        Labels of two effects that the manoeuvre must distinguish, instead of using the study's criteria.
     encoder : Encoder, optional
-        Noise of the joints' encoders, by default the study's or that of a good encoder.
+        Noise of the joint encoders, by default the study's or that of a good encoder.
     executor : concurrent.futures.Executor, optional
         Where the searches run, by default in threads of this process.
     store : Store, optional
-        What keeps the searches done, so that an interrupted design goes on from there.
+        Store of completed searches, from which an interrupted design resumes.
     progress : Progress, optional
         Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        If the study defines no design problem, or no manoeuvre keeps the limits.
+        If the study defines no design problem, or no manoeuvre satisfies the limits.
     """
     title = ""
     if isinstance(study, Problem):

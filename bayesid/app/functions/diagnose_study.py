@@ -43,40 +43,40 @@ def diagnose(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Show how the simulation deviates, name the cause, extend the model by it and measure the gain.
+    """Compare simulation and recordings, identify the cause of deviations, extend the model and measure the gain.
 
     Parameters
     ----------
     study : path, Study or Model
     manoeuvres : sequence of Manoeuvre, optional
-        Recorded manoeuvres of a model; a study names its own.
+        Recorded manoeuvres of a model; a study names its recordings.
     seed : int
         Seed of all random numbers.
     effective_samples : float
         Goal for the number of effective samples of the extended model.
     sample : bool
-        Whether to sample the extended model by emcee at the end.
+        Whether to sample the extended model with emcee after the verdict.
     fly_next : bool
-        Whether to design the next manoeuvre of a study where the verdict is undecided.
+        Whether to design the next manoeuvre of a study if the verdict is undecided.
     effects : sequence of Effect, optional
-        Candidates, by default all of the catalogue that could be at work.
+        Candidates, by default all effects of the catalogue that can act.
     bounds : mapping of str to sequence of PhysicalBound, optional
-        Largest sizes that are known better, by the candidates' labels, by default those of the study.
+        Better-known largest sizes by the candidates' labels, by default those of the study.
     prior : CausePrior, optional
-        Prior of the number of causes and of something outside the catalogue, by default that of the study.
+        Prior of the number of causes and of a cause outside the catalogue, by default that of the study.
     settings : DiagnosisSettings
-        Thresholds by which it decides.
+        Thresholds of the decisions.
     knows_latitude : bool
-        Whether the arguments of latitude of a model's manoeuvres are known; of a study, whether it gives them all.
+        Whether the arguments of latitude of a model's manoeuvres are known; for a study, whether it gives all of them.
     executor : concurrent.futures.Executor, optional
-        Where the refits without each of the recordings run.
+        Executor of the refits that omit one recording each.
     progress : Progress, optional
         Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        If the study is wrong, or numbers cannot be in the units of the format.
+        If the study is invalid, or values cannot be in the units of the format.
     """
     whole: Study | None = None
     if isinstance(study, Model):
@@ -137,7 +137,7 @@ def followed_up(
         try:
             planned = designed_next(study, result.rivals, seed, silent)
         except InputError as error:
-            changes["advice"] = f"No manoeuvre was designed that tells {' and '.join(result.rivals)} apart: {error}."
+            changes["advice"] = f"No manoeuvre was designed to distinguish {' and '.join(result.rivals)}: {error}."
         else:
             changes["next_manoeuvre"] = planned
             changes["advice"] = (

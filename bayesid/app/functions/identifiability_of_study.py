@@ -30,11 +30,11 @@ class Identifiability(ShortForm):
     title : str
         Title of the study.
     structure : BaseParameters
-        What motion of the robot can show at all.
+        Parameters that the motion of the robot can determine in principle.
     practical : Practical or None
-        What these manoeuvres, sensors and priors tell; None where they are not given.
+        Parameters that these manoeuvres, sensors and priors determine; None if they are not given.
     statement : str
-        On what `practical` rests, or why it is not evaluated.
+        Basis of `practical`, or the reason why it is not evaluated.
     """
 
     title: str
@@ -43,7 +43,7 @@ class Identifiability(ShortForm):
     statement: str
 
     def summary(self) -> Summary:
-        """Return what can be known, how well, and what would tell more."""
+        """Return which parameters can be determined, how well, and which additions would help."""
         lines = [structure_sentence(self.structure), self.statement]
         if self.practical is not None:
             lines += [*practical_sentences(self.practical), *advice_sentences(self.practical)]
@@ -71,25 +71,25 @@ def identifiability(
     profiles: int = 6,
     progress: Progress = silent,
 ) -> Identifiability:
-    """Determine what manoeuvres and sensors tell of the bodies, and what would tell more.
+    """Determine which body parameters manoeuvres and sensors resolve, and which additions would help.
 
     Parameters
     ----------
     study : path, Study, Posterior or Robot
-        Of a robot alone, only what its structure allows is determined.
+        For a robot alone, only structural identifiability is determined.
     seed : int
         Seed of all random numbers.
     effective_samples : float
-        Number of effective samples where emcee is needed.
+        Number of effective samples if emcee is required.
     profiles : int
-        Largest number of parameters to profile.
+        Maximum number of parameters to profile.
     progress : Progress, optional
         Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        If the study is wrong.
+        If the study is invalid.
     """
     title, missing = "", "no recordings are given" if isinstance(study, Robot) else ""
     if isinstance(study, Posterior):

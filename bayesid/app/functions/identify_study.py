@@ -42,18 +42,18 @@ def identify(
     start : (size,) array, optional
         Starting point of the search for the mode, by default the prior's centre.
     sampler : Sampler, optional
-        What samples the posterior, by default `Emcee`, whose further arguments may be given here.
+        Sampler of the posterior, by default `Emcee`, whose further arguments may be given here.
     max_steps : int
-        Largest number of steps of each of emcee's ensembles.
+        Maximum number of steps per emcee ensemble.
     file : path or emcee.backends.HDFBackend, optional
-        File of emcee that keeps every step; a run that was interrupted goes on from there.
+        File in which emcee stores every step; an interrupted run resumes from it.
     progress : Progress, optional
         Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        If the study is wrong, nothing is unknown, nothing moves, or no value of the unknowns comes near the data.
+        If the study is invalid, nothing is unknown, nothing moves, or no values of the unknowns fit the data.
     """
     posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
     if not posterior.size:

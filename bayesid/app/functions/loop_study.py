@@ -106,7 +106,7 @@ class LoopResult(ShortForm):
 
     @property
     def status(self) -> str:
-        """How it ended: ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``."""
+        """How the loop ended: ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``."""
         return self.history.status
 
     @cached_property
@@ -125,11 +125,11 @@ class LoopResult(ShortForm):
 
     @property
     def bodies(self) -> dict[str, BodyDraws]:
-        """Draws of the bodies as the last identified step leaves them, empty before the first."""
+        """Draws of the bodies after the last identified step, empty before the first."""
         return next((step.bodies for step in reversed(self.steps) if step.bodies), {})
 
     def summary(self) -> Summary:
-        """Return what every step told, how the loop ended, and what to do next."""
+        """Return the result of every step, how the loop ended, and what to do next."""
         return Summary(list(loop_sentences(self.history)))
 
     def to_dict(self) -> dict[str, Any]:
@@ -152,38 +152,38 @@ def loop(
     diagnose: bool = True,
     progress: Progress = silent,
 ) -> LoopResult:
-    """Plan a manoeuvre, have it executed, identify, diagnose, plan again, until what is wanted is known.
+    """Plan a manoeuvre, have it executed, identify, diagnose, and repeat until the goals are reached.
 
     Parameters
     ----------
     study : path or Study
     output : path
-        Folder that keeps every step; the loop goes on from what it holds.
+        Folder in which every step is stored; the loop resumes from its content.
     seed : int
         Seed of all random numbers.
     effective_samples : float
         Goal for the number of effective samples of each identification.
     spacecraft : Spacecraft or path, optional
-        What executes plans, or the Python file that defines it; without it, recordings are put into the folder.
+        Object that executes plans, or the Python file that defines it; without it, recordings are put into the folder.
     precision : float, optional
-        Relative standard deviation of mass and principal moments; 0.01 if nothing else is wanted.
+        Required relative standard deviation of mass and principal moments; 0.01 if no other goal is given.
     wanted_sd : sequence of str, optional
-        ``BODY.QUANTITY=SD``, standard deviations in SI units.
+        ``BODY.QUANTITY=SD``, required standard deviations in SI units.
     wanted_tip : float, optional
-        Longest semi-axis of the end-effector's 95 % region [mm].
+        Required longest semi-axis of the end-effector's 95 % region [mm].
     wanted_cause : str, optional
         ``NAME`` or ``NAME=PROBABILITY`` of a cause whose presence is to be decided, by default to 0.95.
     at_most : int
-        Largest number of manoeuvres.
+        Maximum number of manoeuvres.
     diagnose : bool
-        Whether to diagnose after every step, and stop if the model is wrong.
+        Whether to diagnose after every step and stop if the model is wrong.
     progress : Progress, optional
         Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        If the study or a goal is wrong, a plan is impossible or a recording does not fit.
+        If the study or a goal is invalid, a plan is impossible or a recording does not match its plan.
     """
     if at_most < 1:
         raise InputError(f"{at_most} manoeuvres", place="--at-most", remedy="Allow at least one")
@@ -225,7 +225,7 @@ def _goals(
         body = next((body for body in bodies if name.startswith(f"{body}.")), None)
         if body is None:
             remedy = f"Write BODY.QUANTITY=SD, with a body among {', '.join(bodies)}: {bodies[0]}.mass=0.5"
-            raise InputError(f"{text!r} names no body to identify", place="--wanted-sd", remedy=remedy)
+            raise InputError(f"{text!r} does not name a body to identify", place="--wanted-sd", remedy=remedy)
         goals.append(QuantitySd(body, name.removeprefix(f"{body}."), _number(value, text, "--wanted-sd")))
     if region is not None:
         if not region > 0.0:

@@ -41,13 +41,13 @@ class Predictions(ShortForm):
     recordings: tuple[Prediction, ...]
 
     def summary(self) -> Summary:
-        """Return where the end-effector ends, a sentence for each recording."""
+        """Return the final position of the end-effector, one sentence per recording."""
         lines = []
         for prediction in self.recordings:
             final = prediction.tip.pose().millimetres
             place = ", ".join(format_quantity(float(m), float(s)) for m, s in zip(final.mean, final.sd, strict=True))
             frame = prediction.tip_frame
-            lines.append(f"{prediction.name}: {frame} ends at ({place}) mm from where the base started.")
+            lines.append(f"{prediction.name}: {frame} ends at ({place}) mm from the initial position of the base.")
         return Summary(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -65,19 +65,19 @@ def predict(
     tip_frame: str | None = None,
     progress: Progress = silent,
 ) -> Predictions:
-    """Predict where planned joint motions take base and end-effector.
+    """Predict the motion of base and end-effector for planned joint motions.
 
     Parameters
     ----------
     study : path, Study or Model
     manoeuvres : sequence of Manoeuvre, optional
-        Planned manoeuvres of a model; a study names its own.
+        Planned manoeuvres of a model; a study names its recordings.
     seed : int
         Seed of all random numbers.
     draws : int
         Number of draws of the robot's parameters.
     posterior : path, optional
-        ``posterior.nc`` of an earlier study, in place of the study's prior.
+        ``posterior.nc`` of an earlier study, which replaces the study's prior.
     tip_frame : str, optional
         Frame of the end-effector, by default that of the study's section ``[design]`` or the last link.
     progress : Progress, optional
@@ -86,7 +86,7 @@ def predict(
     Raises
     ------
     InputError
-        If the study is wrong, or a motion is beyond the joints' limits.
+        If the study is invalid, or a motion exceeds the limits of the joints.
     """
     if isinstance(study, Model):
         model, planned = study, list(manoeuvres or ())

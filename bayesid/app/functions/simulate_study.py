@@ -31,11 +31,11 @@ class Simulation(ShortForm):
     recordings : tuple of Recording
         Readings of the sensors with the joints' motion.
     planned : bool
-        Whether the joints' motion is planned, and not recorded with readings of all sensors.
+        Whether the joint motion is planned, and not recorded with readings of all sensors.
     noise : bool
         Whether the sensors' noise was added.
     integration_error : float
-        Largest error of any sample by the integration step, in standard deviations of the sample.
+        Largest error of any sample caused by the integration step, in standard deviations of the sample.
     """
 
     posterior: Posterior
@@ -63,7 +63,7 @@ class Simulation(ShortForm):
         }
 
     def summary(self) -> Summary:
-        """Return what was simulated, and how accurately."""
+        """Return the simulated manoeuvres and the accuracy of the simulation."""
         step, error = self.posterior.step, self.integration_error
         simulated = counted(len(self.recordings), "recording")
         said = f"Simulated {simulated}; integration step {step:g} s, error {error:.2g} sigma."
@@ -71,12 +71,12 @@ class Simulation(ShortForm):
 
 
 def simulate(study: StudySource | Posterior, seed: int = 0, *, noise: bool = True) -> Simulation:
-    """Simulate what the sensors should read at the given values.
+    """Simulate the sensor readings at the stated parameter values.
 
     Parameters
     ----------
     study : path, Study or Posterior
-        Its recordings may hold planned motion of the joints alone.
+        Its recordings may contain planned joint motion only.
     seed : int
         Seed of the noise.
     noise : bool
@@ -85,7 +85,7 @@ def simulate(study: StudySource | Posterior, seed: int = 0, *, noise: bool = Tru
     Raises
     ------
     InputError
-        If the study is wrong, or numbers cannot be in the units of the format.
+        If the study is invalid, or values cannot be in the units of the format.
     """
     if isinstance(study, Posterior):
         posterior, planned = study, False

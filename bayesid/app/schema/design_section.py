@@ -28,7 +28,7 @@ FEWEST_SAMPLES = 16  # smallest number of samples of a manoeuvre, since fewer do
 
 
 class DesignLimits(Section):
-    """Section ``[design.limits]``, the limits of a designed manoeuvre; only those given apply.
+    """Section ``[design.limits]``, the limits of a designed manoeuvre; limits that are not given do not apply.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ class DesignLimits(Section):
     joint_speed : float, optional
         Largest speed of any joint [rad/s or m/s].
     base_rotation : float, optional
-        Largest rotation of the base since the start [rad].
+        Largest rotation of the base relative to the start [rad].
     quiet_band : (2,), optional
-        Frequencies between which the motion must not excite the base [Hz].
+        Frequency band in which the motion must not excite the base [Hz].
     """
 
     tip_speed: Positive | None = None
@@ -52,13 +52,13 @@ class DesignLimits(Section):
     @classmethod
     def _ascending(cls, band: tuple[float, float] | None) -> tuple[float, float] | None:
         if band is not None and band[0] >= band[1]:
-            raise InputError(f"{list(band)} does not ascend", remedy="Give the lower frequency first")
+            raise InputError(f"{list(band)} is not ascending", remedy="Give the lower frequency first")
         return band
 
 
 def _ascending_times(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
     if not points or any(later[0] <= earlier[0] for earlier, later in pairwise(points)):
-        raise InputError("the times do not ascend", remedy="Give pairs [time, speed] in the order of time")
+        raise InputError("the times are not ascending", remedy="Give pairs [time, speed] in ascending order of time")
     return points
 
 
@@ -86,21 +86,21 @@ class DesignSection(Section):
     interval : float, optional
         Interval between samples of all sensors [s].
     start : table of joint to float, optional
-        Positions before and after the manoeuvre, by default zero or the end of the joint's range nearest to it
+        Positions before and after the manoeuvre, by default zero or the limit of the joint's range nearest to zero
         [rad or m].
     parameterisation : {"b-splines", "fourier", "paper"}, optional
         Family of joint motions.
     functions : int, optional
-        Number of free functions of every joint, by default 8; the paper's family has none.
+        Number of free functions per joint, by default 8; the paper's family has none.
     criteria : sequence of str, optional
-        Names of the criteria, each of which designs one manoeuvre; a plugin may register further ones.
+        Names of the criteria; one manoeuvre is designed per criterion. Plugins may register further criteria.
     options : table of criterion to table, optional
-        Parameters of the criteria that have some, such as those of a plugin.
+        Parameters of criteria that take any, such as those of a plugin.
     rivals : sequence of str, optional
         Labels of the effects to distinguish, for the criterion "separation".
     wheel_speed : table of wheel to float or list of pairs, optional
-        Speed of a wheel during the manoeuvre [rad/s], or times [s] and speeds through which it goes; by default at
-        rest.
+        Speed of a wheel during the manoeuvre [rad/s], or pairs of time [s] and speed that are interpolated; by
+        default at rest.
     attitude : (4,), optional
         Initial attitude, a quaternion from base to orbit axes.
     attitude_sigma : float, optional
@@ -129,9 +129,9 @@ class DesignSection(Section):
     def _check_samples(self) -> DesignSection:
         if self.duration < FEWEST_SAMPLES * self.interval:
             raise InputError(
-                f"{self.duration:g} s hold fewer than {FEWEST_SAMPLES} samples at intervals of {self.interval:g} s",
+                f"{self.duration:g} s contain fewer than {FEWEST_SAMPLES} samples at intervals of {self.interval:g} s",
                 place="interval",
-                remedy="Sample faster or allow more time",
+                remedy="Sample faster or increase the duration",
             )
         return self
 
@@ -148,5 +148,5 @@ class DesignSection(Section):
     @model_validator(mode="after")
     def _check_rivals(self) -> DesignSection:
         if len(self.rivals) == 1:
-            raise InputError("1 effects to tell apart", place="rivals", remedy="Name at least two, or no rivals")
+            raise InputError("1 effect to distinguish", place="rivals", remedy="Name at least two, or no rivals")
         return self

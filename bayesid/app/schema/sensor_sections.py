@@ -34,16 +34,16 @@ Arcseconds = Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more
 
 
 class SampledSensor(Section):
-    """Keys on how the readings of a sensor were recorded, as far as that differs from the format.
+    """Keys for readings of a sensor that were recorded differently from the format.
 
     Parameters
     ----------
     missing : float or list of float, optional
         Values that stand for missing readings.
     native_rate : float, optional
-        Rate at which new readings come, where they are held or interpolated between [Hz].
+        Rate of new readings if values in between are repeated or interpolated [Hz].
     latency : float, optional
-        Time by which the stamps of the readings are late, negative where they are early [s].
+        Delay of the time stamps of the readings, negative if they are early [s].
     """
 
     missing: Numbers = ()
@@ -57,13 +57,13 @@ class FilteredSensor(SampledSensor):
     Parameters
     ----------
     low_pass : float, optional
-        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+        Cut-off frequency of a low-pass filter, applied to samples and prediction [Hz].
     decimate : int, optional
-        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
+        Decimation factor n: only every n-th sample is used, in samples and prediction.
     """
 
     NOISE: ClassVar[tuple[str, ...]] = ()
-    """Keys of which exactly one gives the noise."""
+    """Keys for the noise; exactly one must be given."""
 
     low_pass: Positive | None = None
     decimate: Decimation = 1
@@ -78,16 +78,16 @@ class FilteredSensor(SampledSensor):
 
 
 class MountedSensor(FilteredSensor):
-    """Keys of a sensor whose axes may differ from those of the base.
+    """Keys for a sensor whose axes may differ from those of the base.
 
     Parameters
     ----------
     mounting : (4,), optional
         Quaternion from sensor to base axes.
     reflected : bool, optional
-        Whether the axes of the readings are left-handed: all readings are counted the other way before mounting.
+        Whether the axes of the readings are left-handed: the sign of all readings is reversed before mounting.
     scale : float, optional
-        Factor of the readings to their unit, such as of counts.
+        Factor from the readings, such as counts, to their unit.
     """
 
     mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
@@ -98,22 +98,22 @@ class MountedSensor(FilteredSensor):
 class RateSensor(MountedSensor):
     """Section ``[sensors.rate]``, a sensor of the base's angular velocity.
 
-    Exactly one of the first three keys gives the noise.
+    Exactly one of the first three keys defines the noise.
 
     Parameters
     ----------
     sigma : float or (3,)
         Standard deviation of white noise per sample [rad/s].
     angle_random_walk : float
-        Angle random walk from a gyro's data sheet [rad/sqrt(s)]; divided by the square root of the sample interval it
+        Angle random walk from a gyro's data sheet [rad/sqrt(s)]. Divided by the square root of the sample interval it
         gives the noise per sample. 1 deg/sqrt(h) is 2.909e-4 rad/sqrt(s).
     attitude_arcsec : float
-        Accuracy per sample of a star sensor whose attitude was differenced to give the rate [arcsec]; as two samples
-        enter, the noise is sqrt(2) times the angle divided by the sample interval.
+        Accuracy per sample of a star tracker whose attitude was differenced to give the rate [arcsec]. Because two
+        samples enter, the noise is sqrt(2) times the angle divided by the sample interval.
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [rad/s]; by default the model has no bias.
     unit : str, optional
-        Unit of the readings, such as "deg/s", by default "rad/s"; noise and bias are in rad/s whatever it is.
+        Unit of the readings, such as "deg/s", by default "rad/s"; noise and bias are always in rad/s.
     """
 
     NOISE = ("sigma", "angle_random_walk", "attitude_arcsec")
@@ -141,25 +141,25 @@ class RateSensor(MountedSensor):
 class AccelSensor(MountedSensor):
     """Section ``[sensors.accel]``, a sensor of the non-gravitational acceleration at one point of the base.
 
-    Exactly one of the first two keys gives the noise.
+    Exactly one of the first two keys defines the noise.
 
     Parameters
     ----------
     sigma : float or (3,)
         Standard deviation of white noise per sample [m/s2].
     noise_density : float
-        One-sided noise density from a data sheet [m/s2/sqrt(Hz)]; multiplied by the square root of the Nyquist
+        One-sided noise density from a data sheet [m/s2/sqrt(Hz)]. Multiplied by the square root of the Nyquist
         frequency it gives the noise per sample. 1 micro-g/sqrt(Hz) is 9.80665e-6 m/s2/sqrt(Hz).
     position : (3,)
         Position from the base origin, base axes [m].
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [m/s2]; by default the model has no bias.
     unit : str, optional
-        Unit of the readings, such as "g", by default "m/s2"; noise and bias are in m/s2 whatever it is.
+        Unit of the readings, such as "g", by default "m/s2"; noise and bias are always in m/s2.
     gravity : (3,), optional
-        Gravity in the readings, as on the ground: sensor axes, at their first instant [m/s2].
+        Gravity contained in readings on the ground, in sensor axes at the first instant [m/s2].
     gravity_fixed_in : {"sensor", "space"}, optional
-        Whether it stays constant in the axes of the sensor or in space, by default in those of the sensor.
+        Whether gravity is constant in the sensor axes or in space, by default in the sensor axes.
     """
 
     NOISE = ("sigma", "noise_density")
@@ -184,9 +184,9 @@ class AccelSensor(MountedSensor):
 
 
 class AttitudeSensor(FilteredSensor):
-    """Section ``[sensors.attitude]``, a star sensor that measures the attitude from base to orbit axes.
+    """Section ``[sensors.attitude]``, a star tracker that measures the attitude from base to orbit axes.
 
-    Exactly one of the first two keys gives the noise.
+    Exactly one of the first two keys defines the noise.
 
     Parameters
     ----------
@@ -197,10 +197,10 @@ class AttitudeSensor(FilteredSensor):
     order : {"xyzw", "wxyz"}, optional
         Order of the components of the readings.
     inverse : bool, optional
-        Whether they are quaternions from orbit to base axes.
+        Whether the readings are quaternions from orbit to base axes.
     frame : {"orbit", "inertial", "rotating"}, optional
-        Axes to which they are relative: those of the orbit at time 0; other fixed axes, so that only their change from
-        the recording's attitude counts; or axes that turn with the orbit.
+        Reference axes of the readings: those of the orbit at time 0; other fixed axes, so that only the change from
+        the recording's initial attitude is used; or axes that rotate with the orbit.
     """
 
     NOISE = ("sigma", "arcsec")
@@ -228,9 +228,9 @@ class EncoderSensor(SampledSensor):
         Standard deviations of white noise per sample of position [rad, or m for prismatic joints], velocity and
         acceleration, by default estimated from the data.
     unit : str, optional
-        Unit of the angles in the readings, such as "deg", by default "rad"; noise is in rad whatever it is.
+        Unit of the angles in the readings, such as "deg", by default "rad"; noise is always in rad.
     scale : float, optional
-        Factor of all angles to that unit, such as of counts.
+        Factor from all readings of angles, such as counts, to that unit.
     """
 
     sigma: Annotated[PerName, ANGLE_SIGMA] | None = None
@@ -267,12 +267,12 @@ class TorqueSection(Section):
 
 
 class OtherSensor(MountedSensor):
-    """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers by `SensorKind.register`.
+    """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers with `SensorKind.register`.
 
     Parameters
     ----------
     sigma : float or list of float
-        Standard deviation of white noise per sample, of all columns or of each, in the kind's unit.
+        Standard deviation of white noise per sample, for all columns or for each, in the kind's unit.
     position : (3,)
         Position from the base origin, base axes [m].
     """
@@ -287,7 +287,7 @@ class SensorsSection(Section):
     Parameters
     ----------
     rate, accel, attitude : optional
-        Sensors of the base; a sensor that is not given is not used, even if it was recorded.
+        Sensors of the base; a sensor that is not declared is not used, even if it was recorded.
     torque : optional
         Sensors of the joint torques; by default recorded torques are not used.
     encoder : EncoderSensor
@@ -309,6 +309,6 @@ class SensorsSection(Section):
             problem = "no sensor of the base is declared"
             raise InputError(problem, remedy="Add at least one of [sensors.rate], [sensors.accel], [sensors.attitude]")
         if self.rate is not None and self.rate.attitude_arcsec is not None and self.attitude is not None:
-            problem = "a rate differenced from the attitude (rate.attitude_arcsec) is not a second sensor"
+            problem = "a rate differenced from the attitude (rate.attitude_arcsec) is not an independent sensor"
             raise InputError(problem, remedy="Declare either [sensors.rate] or [sensors.attitude]")
         return self

@@ -36,15 +36,15 @@ class Study(Section):
     robot : RobotSection
         Robot and its loads.
     orbit : OrbitSection or None
-        Orbit about the Earth; None away from it, where no environment effect applies.
+        Orbit about the Earth; without it, no environment effect applies.
     sensors : SensorsSection
         Sensors and their noise.
     telemetry : TelemetrySection, optional
-        Times of the recordings, and how samples are used.
+        Times of the recordings, and use of the samples.
     joints : table of JointSection
-        Joints that were recorded otherwise than the robot's file has them, by their names.
+        Joints that were recorded differently from the robot's file, by name.
     recordings : sequence of RecordingSection
-        Recordings; commands that only design need none.
+        Recordings; not required by commands that only design.
     unknowns : UnknownsSection
         Bodies to identify and their priors.
     model : ModelSection, optional
@@ -78,8 +78,8 @@ class Study(Section):
     def of(cls, source: Study | str | Path) -> Study:
         """Return a study, which is read if a path is given."""
         if not isinstance(source, (Study, str, Path)):
-            remedy = "Give the path of a study file, a bayesid.Study, or the object that the function's help names"
-            raise InputError(f"a {type(source).__name__} is no study", remedy=remedy)
+            remedy = "Give the path of a study file, a bayesid.Study, or an object named in the function's help"
+            raise InputError(f"a {type(source).__name__} is not a study", remedy=remedy)
         return source if isinstance(source, Study) else cls.load(source)
 
     @classmethod
@@ -135,14 +135,14 @@ class Study(Section):
         files = [recording.file for recording in self.recordings]
         for index, file in enumerate(files):
             if file in files[:index]:
-                remedy = "Remove one: the same data would count twice"
+                remedy = "Remove one: the same data would be counted twice"
                 raise InputError(f"'{file.name}' is listed twice", place=f"recordings #{index + 1}.file", remedy=remedy)
             for other in files[:index]:
                 if other.stem == file.stem:
                     raise InputError(
-                        f"the name '{file.stem}' is that of two files, '{other}' and '{file}'",
+                        f"the name '{file.stem}' is shared by two files, '{other}' and '{file}'",
                         place=f"recordings #{index + 1}.file",
-                        remedy="Rename one: reports and results tell recordings apart by their names",
+                        remedy="Rename one: reports and results identify recordings by name",
                     )
         for index, load in enumerate(self.robot.loads, start=1):
             if (

@@ -48,7 +48,7 @@ def check_extended(body: BodySection, place: str) -> None:
         raise InputError(
             "the body is a point, a rod or a plate, about which no relative prior can be centred",
             place=place,
-            remedy="Give it an inertia that fills a volume: I1 + I2 > I3 for its principal moments",
+            remedy="Give it the inertia of a body with volume: I1 + I2 > I3 for its principal moments",
         )
 
 
@@ -77,14 +77,14 @@ class RecordingSection(Section):
 
 
 class ChangeSection(Section):
-    """Section ``[[unknowns.changes]]``, a mass-property change since the posterior that is the prior.
+    """Section ``[[unknowns.changes]]``, a mass-property change since the posterior that serves as prior.
 
     Parameters
     ----------
     body : str
         Name of the unknown body that changed.
     mass : float
-        Mass that was added [kg]; negative for mass that was removed, such as burnt fuel.
+        Added mass [kg]; negative for removed mass, such as burnt fuel.
     mass_sigma : float, optional
         Standard deviation of the mass, by default 0 [kg].
     com : (3,)
@@ -120,13 +120,13 @@ class UnknownsSection(Section):
     Parameters
     ----------
     bodies : sequence of str
-        Links or loads whose ten inertial parameters are estimated; it is empty if only effects are.
+        Links or loads whose ten inertial parameters are estimated; empty if only effects are estimated.
     spread : float or table of body to float, optional
         Relative width of the prior in log-Cholesky coordinates, by default 1.
     prior : table of body to BodySection, optional
         Centres of the priors, by default the values of the URDF or of the load.
     posterior : Path, optional
-        File ``posterior.nc`` of an earlier study of these bodies, whose posterior is used as prior.
+        File ``posterior.nc`` of an earlier study of these bodies; its posterior is used as prior.
     changes : sequence of ChangeSection, optional
         Mass-property changes since that posterior.
     """
@@ -140,7 +140,9 @@ class UnknownsSection(Section):
     @model_validator(mode="after")
     def _check_posterior(self) -> UnknownsSection:
         if self.posterior is None and self.changes:
-            raise InputError("there is no posterior that they could change", place="changes", remedy="Give posterior")
+            raise InputError(
+                "there is no posterior to which the changes could apply", place="changes", remedy="Give posterior"
+            )
         for key in ("spread", "prior"):
             if self.posterior is not None and key in self.model_fields_set:
                 raise InputError(
@@ -178,17 +180,17 @@ class ModelSection(Section):
     Parameters
     ----------
     effects : sequence of str, optional
-        Names of effects in the catalogue, with their place where they need one, such as ``payload:LINK``.
+        Names of effects in the catalogue, with their place if required, such as ``payload:LINK``.
     initial_rate : {"unknown", "zero"}, optional
-        Initial rate of each recording, which is estimated or zero.
+        Initial rate of each recording, either estimated or zero.
     initial_rate_sigma : float, optional
         Prior standard deviation of an unknown initial rate, by default that of the model [rad/s].
     plugins : sequence of Path, optional
-        Python files of the user that register effects, sensors or criteria of design.
+        User-supplied Python files that register effects, sensors or design criteria.
     priors : table of effect to table of key to float, optional
-        Prior standard deviations in place of an effect's defaults, in the unit of the key.
+        Prior standard deviations that replace an effect's defaults, in the unit of the key.
     noise : table of fault to table of key to float, optional
-        Faults of the noise, with the names and keys that a diagnosis reports: ``"rate-noise" = { factor = 2.0 }``,
+        Noise faults, with the names and keys that a diagnosis reports: ``"rate-noise" = { factor = 2.0 }``,
         ``"coloured-noise:accel" = { sigma = 1e-5, time = 3.0 }``, ``"outliers:rate" = { fraction = 0.01 }``,
         ``"quantisation:rate" = { step = 1e-6 }``, ``"encoder-noise" = { factor = 2.0 }``. A list has a value per axis.
     """
@@ -249,7 +251,7 @@ class LoadSection(BodySection):
     Parameters
     ----------
     name, link : str
-        Name of the load and of the link that carries it, in whose axes the other parameters are.
+        Name of the load, and of the link that carries it. The other parameters are in the axes of that link.
     """
 
     name: Name
@@ -266,9 +268,9 @@ class WheelSection(Section):
     axis : (3,)
         Unit vector of its axis, base axes.
     inertia : float
-        Moment of inertia about the axis, part of the base's inertia at rest [kg m2].
+        Moment of inertia about the axis; the inertia of the base includes the wheel at rest [kg m2].
     position : (3,), optional
-        Centre in the base, where an imbalance acts, by default the base origin [m].
+        Centre of the wheel in the base, where an imbalance acts, by default the base origin [m].
     """
 
     name: Name
@@ -283,11 +285,12 @@ class RobotSection(Section):
     Parameters
     ----------
     urdf : Path
-        URDF of the robot, whose root link is the base body, or its MJCF, which is rewritten as URDF.
+        URDF of the robot, whose root link is the base body, or MJCF, which is converted to URDF.
     link_spread : float, optional
-        Relative uncertainty of all links that are not unknowns, by default 0, which means known exactly.
+        Relative uncertainty of all links that are not unknowns, by default 0, which means exactly known.
     nearest_physical : bool, optional
-        Whether links whose inertia no rigid body can have take the nearest that one can; by default they are refused.
+        Whether physically impossible link inertias are replaced by the nearest possible ones; by default they are
+        refused.
     loads : sequence of LoadSection, optional
         Bodies that are fixed to links.
     wheels : sequence of WheelSection, optional
@@ -313,7 +316,7 @@ class OrbitSection(Section):
     Parameters
     ----------
     radius : float
-        Radius, or the semi-major axis if there is an eccentricity [m].
+        Radius, or semi-major axis if an eccentricity is given [m].
     eccentricity : float, optional
         Eccentricity, in [0, 1).
     inclination : float, optional
@@ -334,10 +337,10 @@ class OrbitSection(Section):
     @classmethod
     def _above_ground(cls, radius: float) -> float:
         if radius < LOWEST_ORBIT:
-            remedy = "Metres, not kilometres? It is counted from the Earth's centre, not the altitude"
+            remedy = "Metres, not kilometres? The radius is measured from the Earth's centre; it is not the altitude"
             raise InputError(f"{radius:g} m is inside the Earth", remedy=remedy)
         if radius > HIGHEST_ORBIT:
-            raise InputError(f"{radius:g} m is no orbit about the Earth", remedy="Metres, not millimetres?")
+            raise InputError(f"{radius:g} m is not an orbit about the Earth", remedy="Metres, not millimetres?")
         return radius
 
     @model_validator(mode="after")
@@ -353,17 +356,16 @@ Probability = Annotated[Number, Field(gt=0.0, lt=1.0)]
 
 
 class DiagnosisSection(Section):
-    """Section ``[diagnosis]``, what is believed of causes before the recordings are seen.
+    """Section ``[diagnosis]``, prior beliefs about causes.
 
     Parameters
     ----------
     one_more_cause : float
-        Probability that one more cause is at work, however many there are.
+        Prior probability of one more cause, for any number of causes.
     outside_catalogue : float
-        Probability that something is at work that the catalogue does not name.
+        Prior probability of a cause that is not in the catalogue.
     bounds : table of label to table of unit to float
-        Largest plausible sizes that are known better than the defaults, by the label of the effect and the unit of its
-        amplitudes.
+        Largest plausible sizes that replace the defaults, by the label of the effect and the unit of its amplitudes.
     """
 
     one_more_cause: Probability = 0.1

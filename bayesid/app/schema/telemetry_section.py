@@ -13,22 +13,22 @@ __all__ = ["JointSection", "TelemetrySection"]
 
 
 class JointSection(Section):
-    """Section ``[joints.JOINT]``, a joint that was recorded otherwise than the robot's file has it.
+    """Section ``[joints.JOINT]``, a joint that was recorded differently from the robot's file.
 
     Its position is ``sign * scale * reading + offset``.
 
     Parameters
     ----------
     sign : {1, -1}, optional
-        -1 for a joint that counts the other way.
+        -1 for a joint with the opposite sign.
     offset : float, optional
-        What is added to its position [rad or m].
+        Offset added to its position [rad or m].
     scale : float, optional
         Factor of its position, velocity and acceleration, such as 0.001 for millimetres.
     column : str, optional
-        Column ``position.OTHER`` that holds its position; its other readings are then in those of OTHER too.
+        Column ``position.OTHER`` that contains its position; its other readings are then also in the columns of OTHER.
     latency : float, optional
-        Time by which its stamps are late, negative where they are early, in place of the encoders' [s].
+        Delay of its time stamps, negative if they are early; replaces the value of the encoders [s].
     """
 
     sign: Annotated[int, Field(ge=-1, le=1)] = 1
@@ -47,16 +47,16 @@ class JointSection(Section):
 
 
 class TelemetrySection(Section):
-    """Section ``[telemetry]``, the times of all recordings and how their samples are used.
+    """Section ``[telemetry]``, the times of all recordings and the use of their samples.
 
     Parameters
     ----------
     time_unit : {"s", "ms", "us", "ns", "min"}, optional
-        Unit of the times; with it, times counted from long before the recording, as since 1970, count from its start.
+        Unit of the times; if given, times counted from an earlier epoch, such as 1970, are shifted to the start.
     blocks_per_second : float
-        Rate from twice which on samples are averaged over blocks, of which there are at least so many a second [1/s];
-        0 keeps every sample.
+        Minimum number of blocks per second over which samples are averaged; sensors with less than twice this rate
+        are not averaged, and 0 disables averaging [1/s].
     """
 
     time_unit: Literal["s", "ms", "us", "ns", "min"] | None = None
-    blocks_per_second: Annotated[NonNegative, no_more_than(1e5, "Blocks a second, not a length?")] = 10.0
+    blocks_per_second: Annotated[NonNegative, no_more_than(1e5, "Blocks per second, not a duration?")] = 10.0

@@ -167,22 +167,22 @@ def candidates(
 ) -> list[Effect]:
     """Return every effect that the model does not have and that could exist in its situation.
 
-    Where an effect could exist its class states (`Effect.instances`).
+    The class of an effect states where it could exist (`Effect.instances`).
 
     Parameters
     ----------
     model : Model
     knows_latitude : bool
-        Whether the recordings say where on the orbit they were made.
+        Whether the recordings state where on the orbit they were made.
     records_wheels : bool
-        Whether the momentum of the wheels is recorded, so that none runs unseen.
+        Whether the momentum of the wheels is recorded, so that no unrecorded wheel runs.
     longest : float, optional
         Length of the longest recording [s], over which the history of a wheel is resolved.
 
     Raises
     ------
     InputError
-        If an effect of the user's own breaks the contract of a hook, or has no amplitudes that could be weighed.
+        If a user-defined effect violates the contract of a hook, or has no amplitudes that could be weighed.
     """
     present = {effect.label for effect in model.effects}
     possible = [

@@ -24,9 +24,9 @@ class InitialRate(CauseKind):
 
     name = "initial-rate"
     one_form = True
-    summary = "The base was already turning when the recordings began, although the study takes it to be at rest."
-    advice = "It is there before the arm moves: record a rest before the motion."
-    statement = "let the initial rates be unknown"
+    summary = "The base was already turning when the recordings began, although the study assumes that it is at rest."
+    advice = "It is present before the arm moves: record a period of rest before the motion."
+    statement = "treat the initial rates as unknown"
 
     def signatures(
         self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds

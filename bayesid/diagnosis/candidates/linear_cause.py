@@ -39,14 +39,14 @@ class LinearCause(CauseKind):
     def check(self, effect: Effect) -> None:
         """Raise an `InputError` if an effect vibrates, or has shapes besides its amplitudes."""
         if effect.modes_count:
-            problem = "a vibration of one's own has no bounds by which it could be weighed"
+            problem = "a user-defined vibration has no bounds from which its evidence could be computed"
             raise not_weighable(effect, problem, "Derive it from FlexibleAppendage or FuelSlosh")
         shapes = [parameter.name for parameter in effect.in_amplitudes().parameters if not parameter.is_amplitude]
         if shapes and effect.amplitude_units != MOMENT_UNITS:
             raise not_weighable(
                 effect,
                 f"it is not linear in {', '.join(shapes)}, whose prior is not a normal distribution about zero",
-                "Override in_amplitudes and amplitudes by a form with amplitudes alone",
+                "Override in_amplitudes and amplitudes with a form that has amplitudes alone",
             )
 
     def signatures(

@@ -171,7 +171,7 @@ class ShapedCause(CauseKind):
                 if tuning is None:
                     continue
                 exact, log_share = tuning
-                label = f"{effect.label} tuned beside {' + '.join(causes) or 'nothing'}"
+                label = f"{effect.label} tuned with {' + '.join(causes) or 'nothing'}"
                 (columns,) = _responses(point.perturbed, point.fit, [exact])
                 items, groups = _form(label, self.with_names(exact, names), columns, bounds[effect.label])
                 bank = SignatureBank((*bank.signatures, *items), bank.causes)

@@ -45,16 +45,16 @@ _Key = tuple[tuple[str, ...], str | None]
 class CausePrior:
     """How many causes a study has, and whether something generic is at work.
 
-    The number of causes is geometric: one more is at work with one probability, however many there are. All sets of
-    one size are equally probable. The default of 0.1 keeps the promise of the alarm in the names as well: a cause with
-    a probability of 0.9 leaves nothing with less than 0.1, and the average evidence of any set where nothing is lacking
-    is 1, so that by Markov's inequality at most one such study in ``9 * 0.81 / 0.1 = 73`` names a cause without rivals,
-    however many candidates there are. Among 40, one has to earn 8.2 nats beyond nothing for that, and a second one 7.5
-    beyond the first.
+    The number of causes is geometric: one more is at work with the same probability, regardless of how many there are.
+    All sets of one size are equally probable. With the default of 0.1, the named causes have the reliability of the
+    alarm: a cause with a probability of 0.9 permits less than 0.1 for no cause, and the average evidence of any set is
+    1 if the model lacks nothing, so that by Markov's inequality at most one such study in ``9 * 0.81 / 0.1 = 73`` names
+    a cause without rivals, regardless of the number of candidates. Among 40, one must gain 8.2 nats over no cause for
+    that, and a second one 7.5 over the first.
 
-    Something generic is at work, beside any causes, with the other probability, shared equally among the generic
-    candidates. Its default of 0.1 says that what is lacking lies outside the catalogue as often as it is one of its
-    causes: the least presumptuous choice for a catalogue whose completeness nobody knows.
+    A generic candidate, which is outside the catalogue, is at work in addition to any causes with the other
+    probability, shared equally among the generic candidates. Its default of 0.1 means that the missing cause is outside
+    the catalogue as often as it is in it: the least presumptuous choice for a catalogue of unknown completeness.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class CausePrior:
         size, causes : int
             Number of causes in the set and in the catalogue.
         generic : bool
-            Whether the set holds a generic candidate.
+            Whether the set contains a generic candidate.
         generics : int
             Number of generic candidates.
         """
@@ -101,7 +101,7 @@ class CauseSet:
     causes : tuple of str
         Causes of the catalogue, sorted.
     generic : str or None
-        Generic candidate beside them.
+        Generic candidate in addition to them.
     log_evidence : float
         Relative to nothing.
     log_prior : float
@@ -166,7 +166,7 @@ class SetProbabilities:
         return SetProbabilities(ranked, causes, generics, prior)
 
     def under(self, prior: CausePrior) -> SetProbabilities:
-        """Return the probabilities of the same sets under another prior of causes; no evidence is computed anew."""
+        """Return the probabilities of the same sets under another prior of causes, without computing new evidence."""
         return SetProbabilities.of(self.sets, self.causes, self.generics, prior)
 
     def with_sets(self, sets: Iterable[CauseSet]) -> SetProbabilities:
@@ -175,7 +175,7 @@ class SetProbabilities:
 
     @property
     def nothing(self) -> float:
-        """Probability that nothing is lacking."""
+        """Probability that the model lacks nothing."""
         return _total(cause_set for cause_set in self.sets if not cause_set.names)
 
     @property

@@ -49,7 +49,7 @@ class Status(Enum):
 
 
 class Rest(Enum):
-    """Whether something unnamed acts beside the named causes."""
+    """Whether something unnamed acts in addition to the named causes."""
 
     NONE = "none"
     UNDECIDED = "undecided"
@@ -58,13 +58,13 @@ class Rest(Enum):
 
 @dataclass(frozen=True)
 class Remainder:
-    """What acts beside the named causes, a statement of its own.
+    """What acts in addition to the named causes, stated separately.
 
     Attributes
     ----------
     probability : float
-        Probability that something without a name is at work. Where a cause is sure and those beside it are not, that
-        anything beside it is.
+        Probability that an unnamed cause is at work. If a cause is certain and those accompanying it are not, the
+        probability that anything accompanies it.
     verdict : Rest
         None below `DiagnosisSettings.remainder_from`, present above `DiagnosisSettings.unknown_from`.
     """
@@ -88,20 +88,20 @@ class Remainder:
 
 @dataclass(frozen=True)
 class ProbableVerdict:
-    """What the probabilities say.
+    """Verdict that follows from the probabilities.
 
     Attributes
     ----------
     status : Status
     causes : tuple of str
-        Best set of causes, one for each class, the most probable first; empty where adequate, unresolved or unknown.
+        Best set of causes, one for each class, the most probable first; empty if adequate, unresolved or unknown.
     equivalent_to : dict of str to tuple of str
-        Other names for the same change of the model, by cause; only causes that have any.
+        Causes with the same effect on the model, by cause; only causes that have any.
     ambiguous_with : tuple of tuples of str
-        Other alternatives, the most probable first. An empty one says that nothing may be lacking, and the name
-        "unknown" stands for any generic candidate.
+        Other alternatives, the most probable first. An empty one means that the model may lack nothing, and the name
+        "unknown" represents any candidate outside the catalogue.
     remainder : Remainder
-        Whether something acts beside the named causes.
+        Whether something acts in addition to the named causes.
     """
 
     status: Status

@@ -117,7 +117,7 @@ class EncoderFault(NoiseFault):
 
     name = "encoder-noise"
     summary = "The encoders are noisier than their data sheet: every sample's error is larger by one factor."
-    parameters = "factor [1]: by which the noise exceeds the declared"
+    parameters = "factor [1]: ratio of the noise to the declared noise"
     needs = "sigma in [sensors.encoder]"
     in_residual = False
 

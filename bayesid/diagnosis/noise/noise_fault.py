@@ -322,7 +322,7 @@ def register_fault(fault: F) -> F:
     """Make a fault of the noise known to diagnoses and study files; a class decorator."""
     known = _REGISTER.get(fault.name)
     if known is not None and known.__qualname__ != fault.__qualname__:
-        raise InputError(f"two faults of the noise are named {fault.name!r}", remedy="Give each a name of its own")
+        raise InputError(f"two faults of the noise are named {fault.name!r}", remedy="Give each a different name")
     _REGISTER[fault.name] = fault
     return fault
 

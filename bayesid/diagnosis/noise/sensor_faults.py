@@ -46,7 +46,7 @@ class UnderstatedNoise(SensorFault):
 
     name = "noise"
     summary = "The sensor is noisier than its data sheet: every sample's error is larger by one factor."
-    parameters = "factor [1]: by which the noise exceeds the declared"
+    parameters = "factor [1]: ratio of the noise to the declared noise"
 
     @property
     def entry(self) -> str:
@@ -84,8 +84,8 @@ class ColouredNoise(SensorFault):
     """Exponentially correlated noise beside the white noise of a sensor."""
 
     name = "coloured-noise"
-    summary = "The sensor's error at one sample resembles that at the next: it wanders beside its white noise."
-    parameters = "sigma [unit of the sensor], time [s]: of the correlation"
+    summary = "The sensor's error at one sample resembles that at the next: it wanders in addition to its white noise."
+    parameters = "sigma [unit of the sensor], time [s]: standard deviation and correlation time of the added noise"
     slow = True
 
     TIMES: ClassVar[tuple[float, ...]] = (2.0, 6.0, 20.0)  #: correlation times that it is looked for at, in samples
@@ -266,8 +266,8 @@ class Outliers(SensorFault):
     """Readings that are lost or garbled, which the likelihood leaves out."""
 
     name = "outliers"
-    summary = "Some samples are far off, more than noise allows: lost or garbled readings."
-    advice = "They are single samples: look at the readings themselves, and record at rest."
+    summary = "Some samples deviate by far more than noise allows: lost or corrupted readings."
+    advice = "They are single samples: inspect the readings themselves, and record at rest."
     parameters = "fraction [1]: of the samples"
 
     LEVEL: ClassVar[float] = 1e-3  #: probability of more outliers by chance than a study with a fraction allows
@@ -353,7 +353,7 @@ class Outliers(SensorFault):
         """Return the sensor with the fraction of its readings that are no measurement."""
         fraction = number_of(sizes[0])
         if fraction >= 1.0:
-            raise InputError(f"got a fraction of {fraction:g}", remedy="Give the share of garbled readings, below 1")
+            raise InputError(f"got a fraction of {fraction:g}", remedy="Give the share of corrupted readings, below 1")
         return replace(sensor, outliers=fraction)
 
     def in_data(self, model: Model, manoeuvres: Sequence[Manoeuvre], sizes: Sizes) -> list[Manoeuvre]:
@@ -389,7 +389,7 @@ class Quantisation(SensorFault):
 
     name = "quantisation"
     summary = "The sensor reports multiples of a coarse step."
-    advice = "The readings lie on a lattice: record at rest, and compare with the resolution in the data sheet."
+    advice = "The readings lie on a grid: record at rest, and compare with the resolution in the data sheet."
     parameters = "step [unit of the sensor]"
 
     CERTAIN: ClassVar[float] = -1e3  #: logarithm of a p-value that stands for zero: noise never falls on a lattice

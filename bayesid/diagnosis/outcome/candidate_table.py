@@ -41,27 +41,27 @@ POWER_DRAWS = 400  # simulated studies for the power of a candidate, good to 0.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """One candidate cause alone, on top of the present model.
+    """One candidate cause, added alone to the present model.
 
     Attributes
     ----------
     name : str
     probability : float
-        That it is at work, whatever accompanies it.
+        Probability that it is at work, whatever accompanies it.
     signal_to_noise : float
-        Root of the improvement of chi-square by its best form, less its degrees of freedom.
+        Square root of the decrease of chi-square by its best form minus its degrees of freedom.
     p_value, p_value_adjusted : float
         Local and family-wise.
     log_bayes_factor : float or None
-        Against the present model; None where not evaluated.
+        Against the present model; None if not evaluated.
     quantities : tuple of Quantity
-        Amplitudes that vanish with it.
+        Amplitudes, which are zero if it is absent.
     mean, sd, upper_limit : arrays
-        Of the amplitudes, given that it alone is at work; the limit holds their magnitudes with 95 %.
+        Of the amplitudes, given that it alone is at work; their magnitudes lie below the limit with 95 % probability.
     power : float or None
-        Probability that it would have raised the alarm, its size drawn from its prior; None for faults of the noise.
+        Probability that it would have raised the alarm, with a size drawn from its prior; None for noise faults.
     generic : bool
-        Whether it names no cause.
+        Whether it is outside the catalogue.
     """
 
     name: str

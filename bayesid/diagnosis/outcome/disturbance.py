@@ -35,7 +35,7 @@ MOST_CORRELATIONS = 12
 
 
 class Frame(Enum):
-    """Axes in which a disturbance may keep its direction."""
+    """Axes in which the direction of a disturbance may be fixed."""
 
     BASE = "base"
     ORBIT = "orbit"
@@ -50,19 +50,19 @@ class DisturbingWrench:
     ----------
     signal_to_noise : float
     names : tuple of str
-        Recordings in which it is reconstructed: all, or of many those with the largest residuals.
+        Recordings in which it is reconstructed: all, or the ones with the largest residuals if there are many.
     recordings : tuple of int
         Their numbers.
     time : list of (S,) arrays
         Per recording [s].
     torque, force : dict of Frame to list of (S, 3) arrays
-        Mean, about and through the common centre of mass [N m, N]; the force is not a number where no accelerometer
-        sees it.
+        Mean, about and through the common centre of mass [N m, N]; the force is not a number if no accelerometer
+        observes it.
     torque_sd, force_sd : list of (S, 3) arrays
         Base axes.
     fixed_in : Frame or None
     log_bayes_factor : float
-        Of a free torque and force in every recording against none: what a named cause has to beat.
+        Of a free torque and force in every recording against none: a named cause must exceed it.
     """
 
     signal_to_noise: float

@@ -83,7 +83,7 @@ class Gain:
 
     @property
     def shift(self) -> Floats:
-        """Shift of every reported quantity, in the standard deviations believed before."""
+        """Shift of every reported quantity, in standard deviations of the fit before the extension."""
         return (self.after.bodies.mean - self.before.bodies.mean) / self.before.bodies.sd
 
 

@@ -47,11 +47,11 @@ class TorqueCause:
     ----------
     name : str
     probability : float
-        That it is at work, whatever accompanies it.
+        Probability that it is at work, whatever accompanies it.
     quantities : tuple of Quantity
         Its amplitudes.
     mean, sd : arrays
-        Of the amplitudes, given that it is at work beside all that the verdict names.
+        Of the amplitudes, given that it is at work together with all causes that the verdict names.
     """
 
     name: str
@@ -63,7 +63,7 @@ class TorqueCause:
 
 @dataclass(frozen=True)
 class TorqueReading:
-    """What the torques say beyond the motion.
+    """What the joint torques add to the verdict on the motion.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class TorqueReading:
     p_value : float
         Family-wise p-value of all candidates on the torques together.
     causes : tuple of TorqueCause
-        Every candidate with a name, the most probable first.
+        Every candidate of the catalogue, the most probable first.
     chi2_per_sample : tuple of float
         Of the torques, without and with the causes that the verdict names.
     """
@@ -87,12 +87,12 @@ class TorqueReading:
 
 @dataclass(frozen=True)
 class TorquesNotRead:
-    """Joint torques that were recorded and not read.
+    """Joint torques that were recorded but not evaluated.
 
     Attributes
     ----------
     reason : str
-        Why, as a sentence.
+        The reason, as a sentence.
     """
 
     reason: str
@@ -121,7 +121,7 @@ def torques_beside(
     nameless = any(UNKNOWN in names for names in verdict.ambiguous_with)
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
     if nameless or open_question or verdict.remainder.verdict is Rest.PRESENT:
-        return TorquesNotRead("The motion shows something that has no name, and torques depend on the motion.")
+        return TorquesNotRead("The motion contains something that has no name, and torques depend on the motion.")
     try:
         return read_torques(hypothesis, model, prior, rng, bounds, settings)
     except InputError as error:

@@ -57,7 +57,7 @@ class Hypothesis:
     Attributes
     ----------
     perturbed : PerturbedModel
-        Whose noise has the faults.
+        Model whose noise includes the faults.
     fit : Fit
     faults : tuple of FittedFault
     """

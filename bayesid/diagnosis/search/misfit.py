@@ -23,7 +23,7 @@ from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
 
-UNNAMED = "something beside the fitted causes"
+UNNAMED = "something in addition to the fitted causes"
 """Generic candidate that has no form: whatever the fitted causes leave."""
 
 

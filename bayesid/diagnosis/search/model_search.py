@@ -122,7 +122,7 @@ def search_models(
     bodies_fixed : bool
         Whether the bodies are fixed in the fit, which diverged: the model is then linearised along the data.
     """
-    progress(0.2, "computing what each candidate would change")
+    progress(0.2, "computing the effect of each candidate")
     base = linearise_along_data(perturbed, catalogue) if bodies_fixed else linearise(perturbed, fit, catalogue)
     progress(0.4, "testing the present model")
     alarm = FamilyAlarm.of(base.evidence, fit, rng, level=catalogue.settings.alarm_level)
@@ -193,7 +193,7 @@ def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, pro
         for model in sorted(models.values(), key=lambda model: -model.log_nothing):
             if model.names in searches or model.log_nothing + reach < best().highest - settings.fault_far_behind:
                 continue
-            progress(0.6, f"weighing the causes beside {' and '.join(model.names)}")
+            progress(0.6, f"weighing the causes together with {' and '.join(model.names)}")
             searches[model.names] = search_sets(model, catalogue)
             give_back_memory()
 

@@ -202,7 +202,7 @@ def refuse_conventions(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
     ConventionError
     """
     if conventions := find_conventions(model, manoeuvres):
-        remedy = "State that in the study; `bayesid init --fix STUDY.toml` writes it"
+        remedy = "State this in the study, or run `bayesid init --fix STUDY.toml`"
         raise ConventionError(conventions, remedy=remedy)
 
 

@@ -77,6 +77,6 @@ def _with_gravity(fixed: str) -> Mistake:
     def text(readings: ReadingsOnGrid) -> str:
         size = float(np.linalg.norm(_gravity(readings, fixed)[0]))
         where = "the sensor's axes" if fixed == "sensor" else "space"
-        return f"The accelerometer reads gravity, {size:.4g} m/s2, constant in {where}: it was on the ground."
+        return f"The accelerometer reads gravity, {size:.4g} m/s2, constant in {where}: it was recorded on the ground."
 
     return Mistake("convention:gravity:accel", "accel", "gravity:accel", 1, undo, remedy, text, 0.5, ("accel",))

@@ -44,7 +44,7 @@ def _other_way(index: int, name: str, share: float) -> Mistake:
         2,
         lambda seen: _counted(seen, index, -1.0, 0.0),
         lambda seen: _stated(_counted(seen, index, -1.0, 0.0), name, "sign"),
-        lambda seen: f"Joint {name} counts the other way than in the robot's file.",
+        lambda seen: f"Joint {name} has the opposite sign to that in the robot's file.",
         share,
     )
 
@@ -81,7 +81,7 @@ def _zero_of(index: int, name: str, offset: float, share: float, *, turns: bool)
         3,
         lambda seen: _counted(seen, index, 1.0, offset),
         lambda seen: _stated(_counted(seen, index, 1.0, offset), name, "offset"),
-        lambda seen: f"Joint {name} counts from another zero: add {added}.",
+        lambda seen: f"Joint {name} has a different zero: add {added}.",
         share,
         nearby=nearby,
         value=offset / (ALIKE if turns else ALIKE_SLIDES),

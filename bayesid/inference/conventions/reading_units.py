@@ -74,7 +74,7 @@ def in_unit(kind: SensorKind, unit: str, factor: float, share: float) -> Mistake
     line = f'unit = "{unit}"' if unit else f"scale = {factor:.4g}"
     text = f"The readings of {kind.value} are in {WORDS.get(unit, unit) or 'counts'}, not in {kind.unit}"
     if not unit:
-        text += f": one is some {factor:.4g} {kind.unit}, see the data sheet"
+        text += f": one count is about {factor:.4g} {kind.unit}, see the data sheet"
     return Mistake(
         f"convention:unit:{kind.value}",
         kind.value,
@@ -110,7 +110,7 @@ def _joints_in_unit(model: Model, unit: str, factor: float, share: float) -> Mis
     told = (
         f"in {unit}, not in rad"
         if unit
-        else f"in counts or behind a gear: their angles are {factor:.4g} times as large"
+        else f"in counts or measured behind a gear: their angles are {factor:.4g} times the readings"
     )
 
     def nearby(level: int) -> tuple[Mistake, ...]:

@@ -163,7 +163,7 @@ class ReadingsOnGrid:
         every = max(1, int(np.ceil((last - first) / fastest / MOST)))
         time = np.arange(first + 0.5 * (every - 1) * fastest, last + 0.1 * fastest, every * fastest)
         if len(time) < FEWEST:
-            problem = f"only {len(time)} instants have readings of all sensors"
+            problem = f"only {len(time)} instants contain readings of all sensors"
             raise InputError(problem, file=recording.file or recording.name, remedy="Record for longer")
         sensors = {}
         for sensor in model.sensors:

@@ -61,9 +61,9 @@ def _in_axes(kind: SensorKind, turn: Floats, share: float) -> Mistake:
     def text(readings: ReadingsOnGrid) -> str:
         sensor = "gyro" if kind == SensorKind.RATE else kind.instrument.name
         if np.array_equal(turn, NORTH_EAST_DOWN):
-            return f"Your {sensor} is in north-east-down axes: what it calls x, y, z is x, -y, -z as declared."
+            return f"Your {sensor} is in north-east-down axes: its x, y, z are x, -y, -z of the declared axes."
         left = " They are left-handed." if mirrored else ""
-        return f"Your {sensor} is in other axes: x, y, z as declared are what it calls {shown}.{left}"
+        return f"Your {sensor} is in other axes: x, y, z of the declared axes are its {shown}.{left}"
 
     return Mistake(
         f"convention:axes:{kind.value}", kind.value, f"axes:{kind.value}", 2, undo, remedy, text, share, parts

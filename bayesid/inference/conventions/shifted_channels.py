@@ -58,7 +58,7 @@ def _shifted(channel: str, section: str, samples: float, interval: float, share:
     def text(readings: ReadingsOnGrid) -> str:
         what = {"position": "The joints are", name: f"Joint {name} is"} if name in ("position", *readings.names) else {}
         late = f"{abs(latency):.4g} s ({abs(whole):.3g} samples) {'late' if latency > 0.0 else 'early'}"
-        commanded = ", as if they were commanded and not measured" if what and latency < 0.0 else ""
+        commanded = ", like commanded rather than measured values" if what and latency < 0.0 else ""
         return f"{what.get(name, f'The readings of {name} are')} stamped {late}{commanded}."
 
     return Mistake(

@@ -36,19 +36,22 @@ __all__ = [
 ]
 
 GLOSSARY = (
-    ("σ", "Standard deviation of a sensor's noise per sample, with that of the encoders carried through the dynamics."),
-    ("chi-square per sample", "Mean square of the residuals in σ; one where the model is right."),
-    ("log evidence", "Natural logarithm of the probability of the data under a set of causes, over that under none."),
-    ("probability", "Evidence times prior of a set, over the sum of all sets; of a cause, summed over its sets."),
-    ("class", "Causes that change the model in the same way, as far as these data can tell; they share a probability."),
-    ("something unknown", "Any candidate that names no cause: a smooth torque, force or sensor error, or a pulse."),
-    ("p, family-wise", "Probability that noise alone makes the loudest of all tests as loud as this."),
-    ("signal to noise", "Root of the decrease of chi-square by a candidate, less its degrees of freedom."),
-    ("power", "Probability that a candidate drawn from its prior would have raised the alarm."),
-    ("95 % limit", "Value that the magnitude of a quantity stays below with a probability of 95 %."),
-    ("cosine", "Correlation of the signals of two causes, apart from what the model's unknowns can explain."),
-    ("held-out log score", "Logarithm of the density that a model, fitted to the other recordings, gives to one."),
-    ("without, with", "Fitted with the present model, and with the named causes in it."),
+    ("σ", "Standard deviation of a sensor's noise per sample, including encoder noise propagated by the dynamics."),
+    ("chi-square per sample", "Mean square of the residuals in units of σ; one if the model is correct."),
+    ("log evidence", "Natural logarithm of the probability of the data under a set of causes over that under none."),
+    ("probability", "Of a set: evidence times prior over the sum of all sets. Of a cause: sum over the sets with it."),
+    ("class", "Causes whose effects on the model these data cannot distinguish; they share a probability."),
+    ("something unknown", "Any candidate outside the catalogue: a smooth torque, force or sensor error, or a pulse."),
+    (
+        "p, family-wise",
+        "Probability that noise alone makes the most significant of all tests at least this significant.",
+    ),
+    ("signal to noise", "Square root of a candidate's decrease of chi-square minus its degrees of freedom."),
+    ("power", "Probability that a candidate with a size drawn from its prior would have raised the alarm."),
+    ("95 % limit", "Value below which the magnitude of a quantity lies with a probability of 95 %."),
+    ("cosine", "Correlation of the signals of two causes, without the part that the model's unknowns can explain."),
+    ("left-out log score", "Logarithm of the density of a recording under the model fitted to the other recordings."),
+    ("without, with", "Fitted with the present model, and with the named causes added to it."),
 )
 """Terms of the report and their meanings."""
 
@@ -57,21 +60,21 @@ SEEN = 2.0  # distance from zero, in standard deviations, above which an amplitu
 
 def add_appendix(document: Document, result: Diagnosis) -> None:
     """Add sensitivity, candidates, bounds, the residuals of the other recordings, and the glossary."""
-    document.section("Appendix: how firm the verdict is")
+    document.section("Appendix: robustness of the verdict")
     changed = result.sensitivity.changes
     document.paragraph(
-        f"The verdict would be another under {len(changed)} of {len(result.sensitivity.others)} other choices"
+        f"The verdict would change under {len(changed)} of {len(result.sensitivity.others)} other choices"
         + (f": {', '.join(changed)}." if changed else ".")
     )
     document.table(
-        ["choice", "verdict", "another"],
+        ["choice", "verdict", "changed"],
         sensitivity_rows(result),
         "Sensitivity of the verdict to the two numbers of the prior and to the range of the causes' scales.",
     )
     _add_candidates(document, result)
     _add_torques(document, result)
     document.table(
-        ["cause", "largest size:", "why no more is plausible"],
+        ["cause", "largest size:", "why a larger size is implausible"],
         bound_rows(dict(result.bounds)),
         "Physical bounds on the scales of the causes.",
     )
@@ -91,10 +94,10 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
             "power:",
         ],
         candidate_rows(result.candidates, result.alarm.level),
-        f"All {len(result.candidates)} candidates, each alone beside the present model, from the linear response; the "
-        "probability is that of being at work, whatever accompanies it. The p-value counts all tests. Sizes are given "
-        "of candidates that are seen; of the others, the magnitudes that they stay below with 95 %. A cell is empty "
-        "where nothing was evaluated.",
+        f"All {len(result.candidates)} candidates, each added alone to the present model, from the linear response. "
+        "The probability is that of being at work, whatever accompanies it. The p-value is adjusted for all tests. "
+        "Detected candidates have a size; for the others, the magnitudes lie below the given limits with 95 % "
+        "probability. Empty cells were not evaluated.",
     )
 
 
@@ -103,8 +106,9 @@ def _add_torques(document: Document, result: Diagnosis) -> None:
         document.table(
             ["candidate", "probability:", "size ± sd"],
             torque_rows(result.torques),
-            "What could act on the joint torques alone, read beside the verdict on the motion: the probability of "
-            "being at work, and the size where it is. Something unknown is a torque of any smooth course at one joint.",
+            "Candidates that could act on the joint torques alone, evaluated after the verdict on the motion: the "
+            "probability of being at work, and the size in that case. Something unknown is a torque with any smooth "
+            "time history at one joint.",
         )
 
 
@@ -115,7 +119,7 @@ def add_measured(document: Document, result: Diagnosis) -> None:
     for manoeuvre, sensors in zip(posterior.manoeuvres, sensor_fits(posterior, result.start), strict=True):
         document.figure(
             figures.measured_against_simulated(sensors),
-            f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
+            f"Measured and simulated readings of {manoeuvre.recording.name}, sensor axes; below, the residual in σ.",
         )
 
 

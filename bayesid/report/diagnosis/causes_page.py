@@ -26,15 +26,15 @@ BARS = 20  # largest number of bars of the figure of candidates
 
 def add_causes(document: Document, result: Diagnosis) -> None:
     """Add the most probable sets, the sizes of the named causes, and the strengths of the candidates."""
-    titles = ("What could be at work", "Why this cause", "Why these causes")
+    titles = ("Possible causes", "Why this cause", "Why these causes")
     document.section(titles[min(len(result.verdict.causes), 2)])
     document.table(
         ["causes", "probability:", "log evidence:", "size", "bound:", "share of the bound:"],
         set_rows(result, SETS),
         f"The {min(SETS, len(result.probabilities.sets))} most probable sets of causes, of "
-        f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of nothing. Sizes are root "
-        "mean squares of the amplitudes that share a unit, by the linear model at the most probable scale; a size "
-        "beyond its bound is not plausible. Of a body that is missing or sloshes the mass stands for all its moments.",
+        f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of no cause. Sizes are "
+        "root mean squares of the amplitudes that share a unit, from the linear model at the most probable scale; a "
+        "size beyond its bound is implausible. For a missing or sloshing body, the mass represents all its moments.",
     )
     if rows := cause_rows(result) if result.named else []:
         document.table(
@@ -48,8 +48,9 @@ def add_causes(document: Document, result: Diagnosis) -> None:
     drawn = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, row.name))[:BARS]
     document.figure(
         figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),
-        f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each alone "
-        "beside the present model. Several can stand out for one cause, since they explain parts of the same residual.",
+        f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each added alone "
+        "to the present model. One cause can make several candidates stand out, because they explain parts of the same "
+        "residual.",
         floating=True,
     )
 

@@ -38,21 +38,22 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
             document,
             result,
             changes,
-            "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
-            "them. A shift of many standard deviations of the fit without is the error that would have been believed."
+            "Inertial parameters, ± sd: as given with the prior's width, fitted without the named causes, and fitted "
+            "with them. A shift by many standard deviations of the fit without the causes is an error that would "
+            "otherwise have gone unnoticed."
             if named
-            else "Inertial parameters, ± sd: given with the prior's width, and fitted with the present model.",
+            else "Inertial parameters, ± sd: as given with the prior's width, and fitted with the present model.",
         )
         document.figure(
             figures.parameter_forest(changes, named),
-            "Inertial parameters about the values given, as multiples of the prior's width; bars hold 95 %. Widths "
-            "without the causes assume that the present model is right.",
+            "Inertial parameters relative to the given values, as multiples of the prior's width; bars contain 95 %. "
+            "Widths without the causes assume that the present model is correct.",
             floating=True,
         )
     document.table(
         ["sensor", "unit", *(["before:", "after:"] if named else ["error:"]), "noise alone:"],
         error_rows(result.simulation_errors, named),
-        "Root mean square error of the simulation, length of all axes, freed of its correlation.",
+        "Root mean square error of the simulation, decorrelated: vector length over all axes.",
     )
     _add_disturbance(document, result)
 
@@ -68,13 +69,13 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
     document.paragraph(
         f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
         "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
-        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not in it. "
+        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included. "
         f"{wrench_sentence(wrench)}"
     )
     if wrench.signal_to_noise > 0.0:
         _add_wrench(document, result)
         if named:
-            document.paragraph(f"What the named causes leave. {wrench_sentence(result.unexplained)}")
+            document.paragraph(f"Residual with the named causes in the model: {wrench_sentence(result.unexplained)}")
 
 
 def _add_wrench(document: Document, result: Diagnosis) -> None:
@@ -82,7 +83,7 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
     cause = torque_of_causes(result.after) if result.named else None
     if cause is not None:
         cause = [cause[r] for r in result.disturbance.recordings]
-    dashed = " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
+    dashed = " Dashed: the full torque of the named causes, including the part that the model's unknowns could explain."
     frames = [Frame.BASE]
     if not result.named:
         frames += [Frame.INERTIAL] if result.before.fit.posterior.model.orbit is None else [Frame.ORBIT, Frame.INERTIAL]
@@ -95,15 +96,15 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
     if not result.named:
         document.figure(
             figures.wrench_spectrum(result.disturbance),
-            "Amplitude of the reconstructed torque by frequency, base axes, up to the frequency that is resolved.",
+            "Amplitude of the reconstructed torque by frequency, base axes, up to the highest resolved frequency.",
             floating=True,
         )
     if rows := correlation_rows(result.torque_correlations):
         document.table(
-            ["component, base axes", "moves with", "correlation:"],
+            ["component, base axes", "correlated with", "correlation:"],
             rows,
-            "Largest correlations of the reconstructed torque with known series, all recordings pooled. The series are "
-            "smooth, so that a correlation of one half can be chance.",
+            "Largest correlations of the reconstructed torque with known time series, all recordings pooled. Because "
+            "the series are smooth, a correlation of one half can occur by chance.",
         )
 
 

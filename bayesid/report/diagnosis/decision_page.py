@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from bayesid.diagnosis import Diagnosis, Hypothesis, Status
+from bayesid.diagnosis.outcome.gain import ParameterChange
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, set_text, size_text, verdict_text
 from bayesid.report.diagnosis.consequences_page import add_changes, most_moved
@@ -25,8 +28,8 @@ from bayesid.report.numbers import (
 
 __all__ = ["add_decision", "conditions_text", "decision_entries", "probability_rows"]
 
-MOVED = 4  # inertial parameters in the table of the first page
-CLASSES = 4  # classes of causes in the table of probabilities
+LISTED = ("mass", "com.x", "com.y", "com.z", "inertia.xx", "inertia.yy", "inertia.zz")  # in the table of the first page
+CLASSES = 3  # classes of causes in the table of probabilities
 
 
 def add_decision(document: Document, result: Diagnosis, record: str | None = None) -> None:
@@ -43,23 +46,25 @@ def add_decision(document: Document, result: Diagnosis, record: str | None = Non
     document.decision(f"Decision. {verdict[:1].upper()}{verdict[1:]}", decision_entries(result, record))
     document.figure(
         figures.plot_verdict(result),
-        "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
-        f"{result.recordings[result.strongest_recording]} misses on the axis that "
+        "Left: the robot as given, with the cause where it acts. Right: the residual of "
+        f"{result.recordings[result.strongest_recording]} on the axis that "
         "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
     )
     if result.parameter_changes:
         add_changes(
             document,
             result,
-            most_moved(result.parameter_changes, MOVED),
-            "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
+            _of_most_moved_body(result.parameter_changes),
+            "Mass, centre of mass and moments of inertia: as given, fitted without the named causes, and fitted with "
+            "them, ± sd."
             if result.named
-            else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
+            else "Mass, centre of mass and moments of inertia: as given, and fitted with the present model, ± sd. A "
+            "later page lists all parameters.",
         )
     document.table(
         ["at work", "probability:"],
         probability_rows(result, CLASSES),
-        "Probability of being at work, whatever accompanies it; causes that these data cannot tell apart share a row.",
+        "Probability of being at work, whatever accompanies it; causes that these data cannot distinguish share a row.",
     )
 
 
@@ -74,17 +79,24 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
         for names in verdict.ambiguous_with
     ]
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
-        entries.append(("What is left", wrench_sentence(result.unexplained)))
+        entries.append(("Unexplained", wrench_sentence(result.unexplained)))
     if result.torques is not None:
         entries.append(("Joint torques", torque_sentence(result.torques)))
     if record:
         entries.append(("Record", record))
     entries += [
-        ("What it changes", _change_text(result)),
+        ("Changes", _change_text(result)),
         ("Conditions", conditions_text(result.after)),
-        ("What to do", action_sentence(result)),
+        ("Action", action_sentence(result)),
     ]
     return entries
+
+
+def _of_most_moved_body(changes: Sequence[ParameterChange]) -> list[ParameterChange]:
+    """Return mass, centre of mass and moments of inertia of the body with the parameter that moves most."""
+    (moved,) = most_moved(changes, 1)
+    body = moved.name.rpartition(".inertia.")[0] or moved.name.rpartition(".com.")[0] or moved.name.rpartition(".")[0]
+    return [change for change in changes if change.name in {f"{body}.{quantity}" for quantity in LISTED}]
 
 
 def _cause_text(result: Diagnosis, cause: str) -> str:
@@ -94,18 +106,20 @@ def _cause_text(result: Diagnosis, cause: str) -> str:
 
 def _change_text(result: Diagnosis) -> str:
     """Return the parameter that moves most and the errors of the simulation, before and after."""
-    text = "" if result.named else "No inertial parameter: nothing is added to the model. "
+    text = "" if result.named else "No inertial parameter changes, because nothing is added to the model. "
     for moved in most_moved(result.parameter_changes, 1) if result.named else ():
+        relative = abs(moved.fitted / moved.without - 1.0) if moved.without else 0.0
+        share = f", {format_percent(relative, 2)}" if 0.0 < relative < 1.0 else ""  # moments about zero have no share
         text = (
-            f"{moved.name}: given {format_number(moved.given, 4)}, fitted without "
-            f"{format_quantity(moved.without, moved.without_sd)}, with "
-            f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)}. "
+            f"Without the named causes, {moved.name} would be wrong by {format_number(abs(moved.shift), 2)} standard "
+            f"deviations{share}: {format_quantity(moved.without, moved.without_sd)} in place of "
+            f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)}. No parameter changes more. "
         )
     errors = []
     for error in result.simulation_errors:
         after = f" before, {format_number(error.after, 2)} after" if result.named else ""
         errors.append(f"{error.kind.value} {format_number(error.before, 2)}{after} {format_unit(error.kind.unit)}")
-    return f"{text}Error of the simulation, rms: {'; '.join(errors)}."
+    return f"{text}RMS error of the simulation: {'; '.join(errors)}."
 
 
 def conditions_text(hypothesis: Hypothesis) -> str:
@@ -121,7 +135,7 @@ def conditions_text(hypothesis: Hypothesis) -> str:
     noise = f"noise of {', '.join(coloured)} coloured" if coloured else "noise white"
     if hypothesis.faults:
         noise += f", with {', '.join(fault.label for fault in hypothesis.faults)}"
-    return f"{links}, geometry exact, {noise}; bodies rigid but for the causes considered.".capitalize()
+    return f"{links}, geometry exact, {noise}; bodies rigid except for the causes considered.".capitalize()
 
 
 def probability_rows(result: Diagnosis, most: int) -> Rows:

@@ -74,12 +74,12 @@ def _add_contradiction(document: Document, result: Diagnosis) -> None:
     document.section("The simulation contradicts the recordings")
     families = joined([family.title for family in convention_families()])
     document.paragraph(
-        f"After the fit, with all that is named, chi-square per sample is "
-        f"{format_number(result.gain.after.chi2_per_sample, 3)}, where noise alone gives 1. Of so large a misfit no "
-        "physical cause can be read: the probabilities of causes weigh them against each other only. Tried among wrong "
-        f"conventions of the recordings were {families}; none explains several times more than the study as it stands. "
-        "Check that the robot's file is that of the robot which was recorded, then where sensors are mounted, and "
-        "whether anything moved or acted on it that is not recorded."
+        f"After the fit with all named causes, chi-square per sample is "
+        f"{format_number(result.gain.after.chi2_per_sample, 3)}; noise alone gives 1. From such a large misfit no "
+        "physical cause can be inferred: the probabilities only compare the causes with each other. The following "
+        f"convention errors of the recordings were tested: {families}. None of them explains several times more than "
+        "the study as it stands. Check that the robot file describes the robot that was recorded, then check where "
+        "sensors are mounted, and whether anything that was not recorded moved or acted on the robot."
     )
 
 
@@ -95,8 +95,8 @@ def _refusal(result: Diagnosis) -> InputError | None:
 def _add_sampled(document: Document, result: Diagnosis, identification: Identification) -> None:
     document.section("The extended model, sampled" if result.named else "The present model, sampled")
     document.paragraph(
-        "The rest of this report is the identification with the "
-        + ("model that holds the named causes" if result.named else "present model")
-        + " by sampling: uncertainties from here on need no linearisation."
+        "The rest of this report is the identification by sampling of the "
+        + ("model with the named causes" if result.named else "present model")
+        + ": from here on, the uncertainties do not rely on linearisation."
     )
     add_identification(document, identification, [])

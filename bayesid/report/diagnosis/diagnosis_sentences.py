@@ -54,21 +54,21 @@ AT_MOST = 6  # largest number of quantities of one cause in a sentence
 SHOWN_SETS = 3  # sets named in the sentence of a verdict that names none
 
 FIXED = {
-    Frame.BASE: "It keeps its direction in base axes: its source is on board.",
-    Frame.ORBIT: "It keeps its direction in orbit axes, which turn with the orbit: its source follows the Earth or the "
-    "flight.",
-    Frame.INERTIAL: "It keeps its direction in inertial space: its source lies outside the orbit, as the Sun does.",
+    Frame.BASE: "Its direction is fixed in base axes: the source is on board.",
+    Frame.ORBIT: "Its direction is fixed in orbit axes, which turn with the orbit: the source follows the direction of "
+    "the Earth or of flight.",
+    Frame.INERTIAL: "Its direction is fixed in inertial space: the source is outside the orbit, such as the Sun.",
 }
 """Where the source of a disturbance is, by the axes in which it keeps its direction."""
 
 SEPARATE_UNKNOWN = (
-    "Repeat a manoeuvre unchanged but later: what depends on the clock then comes back at another instant of the "
-    "motion, what depends on the motion at the same. Then repeat it with the base turned to another attitude, and "
-    "record with the arm at rest."
+    "Repeat a manoeuvre unchanged at a later time: effects that depend on the clock then recur at a different instant "
+    "of the motion, effects that depend on the motion at the same instant. Then repeat it with the base in a different "
+    "attitude, and record with the arm at rest."
 )
 """Advice where no cause of the catalogue is at work."""
 
-ANYTHING = "Repeat with other amplitudes, other speeds and the base in another attitude."
+ANYTHING = "Repeat the manoeuvre with different amplitudes and speeds, and with the base in a different attitude."
 """Advice on a cause of which nothing is known."""
 
 
@@ -92,7 +92,8 @@ def undetermined_sentence(result: Diagnosis) -> str:
     every = len(result.undetermined) == len(result.parameter_changes)
     what = f"any parameter of {joined(bodies)}" if every else abridged(result.undetermined)
     return (
-        f"These recordings do not determine {what}: the posterior is the prior. Record joints that move, far and fast."
+        f"These recordings do not determine {what}: the posterior equals the prior. Record large and fast joint "
+        "motions."
     )
 
 
@@ -101,25 +102,25 @@ def verdict_sentence(result: Diagnosis) -> str:
     causes = joined(result.verdict.causes)
     match result.verdict.status:
         case Status.ADEQUATE:
-            return "Adequate: the simulation leaves nothing but the declared noise."
+            return "Adequate: the declared noise alone explains the residuals of the simulation."
         case Status.EXPLAINED:
-            beside = f"with {_them(result)} the simulation needs no other explanation."
+            beside = f"with {_them(result)} in the model, no other explanation is needed."
             return f"Explained by {causes}: {beside} {_together(result)} {remainder_sentence(result)}"
         case Status.PARTLY_EXPLAINED:
             return f"Partly explained by {causes}. {_together(result)} {remainder_sentence(result)}"
         case Status.AMBIGUOUS:
             names = "; or ".join(map(set_text, result.alternatives))
             return (
-                f"Ambiguous: what the simulation leaves comes from {names}. Together these alternatives have a "
+                f"Ambiguous: possible explanations of the residuals are {names}. Together these alternatives have a "
                 f"probability of at least {format_percent(result.settings.covered, 2)}, and the recordings do not "
-                "decide between them."
+                "discriminate between them."
             )
         case Status.UNRESOLVED:
             sets = result.probabilities.sets[:SHOWN_SETS]
             most = "; ".join(f"{set_text(item.names)} ({probability_text(item.probability)})" for item in sets)
             return (
-                "Unresolved: the simulation leaves more than noise, but the probability is spread over too many "
-                f"explanations to name the cause. The most probable sets are: {most}."
+                "Unresolved: the residuals contain more than noise, but the probability is spread over too many "
+                f"explanations for a cause to be named. The most probable sets are: {most}."
             )
     generic, _ = max(
         ((name, result.probabilities.inclusion[name]) for name in result.probabilities.generics),
@@ -127,8 +128,9 @@ def verdict_sentence(result: Diagnosis) -> str:
         default=(NOTHING, 0.0),
     )
     return (
-        "Unknown: what the simulation leaves belongs most probably to no cause of the catalogue "
-        f"({probability_text(result.probabilities.unknown)}). Of what names no cause, the most probable is: {generic}."
+        "Unknown: the anomaly most probably has a cause that is not in the catalogue "
+        f"({probability_text(result.probabilities.unknown)}). Among the candidates outside the catalogue, the most "
+        f"probable is: {generic}."
     )
 
 
@@ -137,10 +139,10 @@ def remainder_sentence(result: Diagnosis) -> str:
     probability = probability_text(result.remainder.probability)
     match result.remainder.verdict:
         case Rest.NONE:
-            return f"Nothing without a name is seen beside {_them(result)} ({probability})."
+            return f"An unnamed cause in addition to {_them(result)} is improbable ({probability})."
         case Rest.UNDECIDED:
-            return f"Whether something without a name acts beside {_them(result)} is undecided ({probability})."
-    return f"Something that is not named acts beside {_them(result)} ({probability})."
+            return f"Whether an unnamed cause acts in addition to {_them(result)} is undecided ({probability})."
+    return f"An unnamed cause acts in addition to {_them(result)} ({probability})."
 
 
 def _them(result: Diagnosis) -> str:
@@ -164,9 +166,9 @@ def alarm_sentence(result: Diagnosis) -> str:
     alarm = result.alarm
     found = "no alarm is raised" if alarm.silent else "an alarm is raised"
     return (
-        f"Of {alarm.tests} tests of what the present simulation leaves, the loudest is that for {alarm.loudest} "
-        f"(p {relation(format_p_value(alarm.p_value))}, all tests counted). Below {alarm.level:g} the alarm is raised: "
-        f"here {found}."
+        f"Of {alarm.tests} tests of the residuals of the present model, the most significant is that for "
+        f"{alarm.loudest} (p {relation(format_p_value(alarm.p_value))}, adjusted for all tests). An alarm requires a "
+        f"value below {alarm.level:g}: {found}."
     )
 
 
@@ -178,12 +180,12 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
             f"The probability that it is at work is {_is(result.cause_probability(label))}.",
         ]
         if amplitude := amplitudes_of(result.after, label):
-            rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
+            rest = "; the table of the named causes lists all of them" if len(amplitude) > AT_MOST else ""
             parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
         if instants := instants_of(result.after, label):
             parts.append(f"When: {amplitude_text(instants, len(instants))}.")
         if others := result.verdict.equivalent_to.get(label):
-            parts.append(f"Other names for the same change: {joined(others)}.")
+            parts.append(f"Equivalent causes: {joined(others)}.")
         yield " ".join(parts)
 
 
@@ -193,7 +195,7 @@ def alternative_sentences(result: Diagnosis) -> Iterator[str]:
         text = f"Alternative: {set_text(names)} ({probability_text(result.probability_of(names))})."
         for name in names:
             if name != UNKNOWN and (others := result.verdict.equivalent_to.get(name)):
-                text += f" Other names for {name}: {joined(others)}."
+                text += f" Equivalent to {name}: {joined(others)}."
         yield text
 
 
@@ -214,7 +216,7 @@ def gain_sentence(result: Diagnosis) -> str:
     if not result.verdict.causes:
         return (
             f"Chi-square per sample is {before.chi2_per_sample:.3f}, and {100.0 * before.inside:.1f} % of the "
-            "residuals lie within one σ, where noise alone gives 1 and 68.3 %."
+            "residuals lie within one σ; noise alone gives 1 and 68.3 %."
         )
     parts = [f"chi-square per sample goes from {before.chi2_per_sample:.3f} to {after.chi2_per_sample:.3f}"]
     if before.held_out is not None and after.held_out is not None:
@@ -224,20 +226,23 @@ def gain_sentence(result: Diagnosis) -> str:
     if shifts := dict(zip(before.bodies.names, result.gain.shift.tolist(), strict=True)):
         name = max(shifts, key=lambda key: abs(shifts[key]))
         parts.append(
-            f"the inertial parameter that moves most is {name}, by {format_signed(shifts[name])} of the standard "
-            "deviations that would have been believed without it"
+            f"the inertial parameter that moves most is {name}, by {format_signed(shifts[name])} standard deviations "
+            f"of the fit without the named {'cause' if len(result.verdict.causes) == 1 else 'causes'}"
         )
     text = f"{', '.join(parts[:-1])}, and {parts[-1]}" if len(parts) > 1 else parts[0]
-    return f"What it gains: {text}."
+    return f"Effect on the fit: {text}."
 
 
 def wrench_sentence(wrench: DisturbingWrench) -> str:
     """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
-        return "A free torque and force on the base would explain no more than noise does."
-    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes it keeps its direction is not decided."
+        return "A free torque and force on the base would explain no more than noise alone."
+    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "The axes in which its direction is fixed are undecided."
     strength = format_fixed(wrench.signal_to_noise, 1)
-    return f"As a free torque and force on the base it has a signal-to-noise ratio of {strength}. {where}"
+    return (
+        "Modelled as a free torque and force on the base, the disturbance has a signal-to-noise ratio of "
+        f"{strength}. {where}"
+    )
 
 
 def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
@@ -248,7 +253,7 @@ def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
     match found.verdict.status:
         case Status.ADEQUATE:
             return (
-                "The joint torques leave nothing but the declared noise "
+                "The declared noise alone explains the residuals of the joint torques "
                 f"(p {relation(format_p_value(found.p_value))}, chi-square per sample {before})."
             )
         case Status.EXPLAINED | Status.PARTLY_EXPLAINED:
@@ -257,15 +262,21 @@ def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
             partly = "partly " if found.verdict.status is Status.PARTLY_EXPLAINED else ""
             return (
                 f"The joint torques are {partly}explained by {sizes}; chi-square per sample goes from {before} to "
-                f"{after}. It changes no motion, since that of the joints is measured."
+                f"{after}. The motion is unaffected, because that of the joints is measured."
             )
         case Status.AMBIGUOUS:
             others = [found.verdict.causes, *found.verdict.ambiguous_with]
-            return f"The joint torques are ambiguous: {'; or '.join(map(set_text, others))}."
+            return (
+                "The joint torques are ambiguous. Possible explanations of their residuals are "
+                f"{'; or '.join(map(set_text, others))}."
+            )
         case Status.UNRESOLVED:
-            return "The joint torques leave more than noise, and the recordings do not say what."
+            return (
+                "The residuals of the joint torques contain more than noise, and the recordings do not determine the "
+                "cause."
+            )
     return (
-        "The joint torques leave something that is neither friction nor a constant error of a sensor "
+        "The residuals of the joint torques contain something that is neither friction nor a constant sensor error "
         f"({probability_text(found.probabilities.unknown)}); chi-square per sample is {before}."
     )
 
@@ -288,14 +299,20 @@ def action_sentence(result: Diagnosis) -> str:
             return _addition(result)
         case Status.PARTLY_EXPLAINED:
             if result.remainder.verdict is Rest.PRESENT:
-                return f"{_addition(result)} Something remains, so that they may be off. {SEPARATE_UNKNOWN}"
-            return f"{_addition(result)} Record more to decide whether anything remains."
+                return (
+                    f"{_addition(result)} An unexplained part remains, so these values may be in error. "
+                    f"{SEPARATE_UNKNOWN}"
+                )
+            return f"{_addition(result)} Record more data to decide whether an unexplained part remains."
         case Status.AMBIGUOUS:
             first = next(advice_sentences(result), "")
-            return f"Do not rely on one of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()
+            return f"Do not rely on any of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()
         case Status.UNRESOLVED:
-            return "Record longer, or repeat the manoeuvres: the signal grows with the root of their number."
-    return f"Do not use the present model's values. {SEPARATE_UNKNOWN}"
+            return (
+                "Make longer recordings or repeat the manoeuvres: the signal grows with the square root of their "
+                "number."
+            )
+    return f"Do not use the values of the present model. {SEPARATE_UNKNOWN}"
 
 
 def _addition(result: Diagnosis) -> str:
@@ -318,7 +335,7 @@ def advice_sentences(result: Diagnosis) -> Iterator[str]:
     for name in result.differing_causes:
         yield f"{name}: {advice(name)}"
     if pair := result.rivals:
-        yield f"A manoeuvre that tells them apart is designed by: bayesid design STUDY.toml --separate {' '.join(pair)}"
+        yield f"To design a manoeuvre that separates them: bayesid design STUDY.toml --separate {' '.join(pair)}"
 
 
 def advice(name: str) -> str:

@@ -22,25 +22,25 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
     document.section("Evidence")
     strongest = result.strongest_recording
     document.paragraph(
-        f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and freed of their "
-        "correlation, so that a right model leaves independent values of standard deviation one. "
+        f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and decorrelated, "
+        "so that a correct model gives independent values with a standard deviation of one. "
         + (
-            "Before is the present model, after the one with the named causes, all unknowns fitted again."
+            "Before refers to the present model, after to the one with the named causes and all unknowns fitted again."
             if result.named
             else ""
         )
     )
     document.figure(
         figures.plot_residuals(result, strongest),
-        f"Residuals in {result.recordings[strongest]}"
+        f"Residuals of {result.recordings[strongest]}"
         + (", the recording that changes most" if len(result.recordings) > 1 else "")
-        + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over a fortieth of the recording.",
+        + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over one fortieth of the recording.",
         floating=True,
     )
     document.figure(
         figures.plot_spectrum(result),
-        "Spectra of the residuals, all recordings pooled, frequencies gathered in bins of equal width: white noise has "
-        "level one. The lowest bins hold what a disturbance or a wrong body leaves.",
+        "Spectra of the residuals, with all recordings pooled and frequencies grouped into bins of equal width: white "
+        "noise has a level of one. The effect of a disturbance or of a wrong body appears in the lowest bins.",
         floating=True,
     )
     _add_gain(document, result)
@@ -53,10 +53,10 @@ def add_other_residuals(document: Document, result: Diagnosis) -> None:
     for index in others[:RECORDINGS]:
         document.figure(
             figures.plot_residuals(result, index),
-            f"Residuals in {result.recordings[index]}, sensor axes.",
+            f"Residuals of {result.recordings[index]}, sensor axes.",
         )
     if len(others) > RECORDINGS:
-        document.paragraph(f"Of {len(others)} further recordings the first {RECORDINGS} are drawn.")
+        document.paragraph(f"The first {RECORDINGS} of {len(others)} further recordings are plotted.")
 
 
 def _add_gain(document: Document, result: Diagnosis) -> None:
@@ -69,10 +69,10 @@ def _add_gain(document: Document, result: Diagnosis) -> None:
         rows,
         "Fit and prediction. "
         + (
-            "With one recording, none can be predicted from others."
+            "A single recording cannot be predicted from others."
             if result.gain.before.held_out is None
-            else "The held-out log score of a recording is the logarithm of the density that the model, fitted to the "
-            "other recordings, gives to it."
+            else "The left-out log score of a recording is the logarithm of its density under the model fitted to the "
+            "other recordings."
         ),
     )
 
@@ -89,10 +89,10 @@ def gain_rows(result: Diagnosis) -> Rows:
     expected = [f"1 ± {format_fixed(spread, 3)}", "0.683", *["1"] * len(before.rms)]
     if before.held_out is not None and after.held_out is not None:
         rows += [
-            _measure(f"held-out log score of {name}", float(one), float(two), 1)
+            _measure(f"left-out log score of {name}", float(one), float(two), 1)
             for name, one, two in zip(_left_out(result.recordings), before.held_out, after.held_out, strict=True)
         ]
-        rows.append(_measure("held-out log score, sum", float(before.held_out.sum()), float(after.held_out.sum()), 1))
+        rows.append(_measure("left-out log score, sum", float(before.held_out.sum()), float(after.held_out.sum()), 1))
     expected += ["higher is better"] * (len(rows) - len(expected))
     return [[*row, text] for row, text in zip(rows, expected, strict=True)]
 

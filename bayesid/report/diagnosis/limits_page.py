@@ -38,13 +38,13 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
     _add_unseen(document, result)
     if pairs := result.inseparable_pairs[:PAIRS]:
         document.table(
-            ["cause", "other", "largest cosine:", "smallest cosine:", "part at SNR:", ""],
+            ["cause", "other", "largest cosine:", "smallest cosine:", "separable at SNR:", ""],
             pair_rows(pairs),
             ("Named causes" if result.named else "The most probable causes")
-            + " and those that imitate them best, apart from what the model's unknowns explain. Where the largest "
-            "cosine is near one, some change by the one can be taken for some change by the other; where the smallest "
-            "is, too, these manoeuvres cannot tell them apart at all. From the signal-to-noise ratio where they part, "
-            "either is told from the other in 95 % of all cases.",
+            + " and those that imitate them best, without the part that the model's unknowns explain. If the largest "
+            "cosine is near one, some effect of one cause can be mistaken for some effect of the other; if the "
+            "smallest is also near one, these manoeuvres cannot separate the two at all. From the given "
+            "signal-to-noise ratio, either is distinguished from the other in 95 % of all cases.",
         )
     document.paragraph("How the verdict was reached:")
     document.items([*method_sentences(result), computation_sentence(result)])
@@ -53,18 +53,19 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
 def _add_unseen(document: Document, result: Diagnosis) -> None:
     if hidden := result.unseen_candidates:
         document.paragraph(
-            "The following candidates could not have been seen: drawn from their priors, these manoeuvres would have "
-            "raised no alarm in more than half of all cases. Their absence from the verdict says little about them."
+            "These manoeuvres could hardly have detected the following candidates: with sizes drawn from their priors, "
+            "they would have raised no alarm in more than half of all cases. Their absence from the verdict is weak "
+            "evidence that they are not at work."
         )
         document.table(
             ["candidate", "power:", "95 % limits on its magnitude"],
             unseen_rows(hidden),
-            "Candidates out of reach of these manoeuvres.",
+            "Candidates that these manoeuvres could hardly have detected.",
         )
     elif result.verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
         document.paragraph(
-            "Every candidate whose power is known, drawn from its prior, would have raised the alarm in at least half "
-            "of all cases: these manoeuvres are enough."
+            "Every candidate of known power, with its size drawn from its prior, would have raised the alarm in at "
+            "least half of all cases: these manoeuvres are sufficient."
         )
 
 
@@ -82,36 +83,37 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     """Return how the verdict was reached."""
     prior, probabilities, settings = result.probabilities.prior, result.probabilities, result.settings
     yield (
-        f"An alarm is raised where the loudest of {result.alarm.tests} tests together is as loud as noise alone "
-        f"makes it in less than {100.0 * result.alarm.level:g} % of cases, all dependence between the tests included."
+        f"An alarm is raised if the most significant of {result.alarm.tests} tests is as significant as noise alone "
+        f"makes it in less than {100.0 * result.alarm.level:g} % of cases; all dependence between the tests is "
+        "included."
     )
     yield (
         f"{len(probabilities.causes)} causes of the catalogue are possible here: {', '.join(probabilities.causes)}. "
-        f"Beside them {len(probabilities.generics)} candidates stand for what is in no catalogue: "
+        f"In addition, {len(probabilities.generics)} candidates represent causes outside the catalogue: "
         f"{', '.join(probabilities.generics)}."
     )
     yield (
-        "The probability of a set of causes is its evidence times its prior. The prior has two numbers: one more cause "
-        f"is at work with a probability of {format_number(prior.one_more)}, however many there are, and something "
-        f"outside the catalogue with {format_number(prior.generic)}. All sets of one size are equally probable "
-        "beforehand."
+        "The probability of a set of causes is proportional to its evidence times its prior. The prior has two "
+        f"numbers: one more cause is at work with a probability of {format_number(prior.one_more)}, regardless of how "
+        f"many there are, and something outside the catalogue with {format_number(prior.generic)}. All sets of the "
+        "same size are equally probable a priori."
     )
     yield (
-        "The scale of the amplitudes of a cause that share a unit is itself unknown: every power of ten between what "
-        "the data cannot resolve and the physical bound is equally probable."
+        "The scale of those amplitudes of a cause that share a unit is itself unknown: every power of ten between the "
+        "resolution of the data and the physical bound is equally probable."
     )
     yield (
-        f"Causes are named where the class of each has a probability of {settings.named_from:g} or more; they explain "
-        f"the data where candidates that name nothing have less than {settings.remainder_from:g}, and else a part of "
-        "them. Otherwise the "
-        f"verdict is ambiguous if two to {settings.most_alternatives} alternatives hold "
-        f"{format_number(100.0 * settings.covered)} %, and unresolved if more are needed. It is unknown if candidates "
-        "that name nothing hold the majority."
+        f"Causes are named if the class of each has a probability of {settings.named_from:g} or more. They explain the "
+        f"data if the candidates outside the catalogue have less than {settings.remainder_from:g}, and a part of the "
+        f"data if those have more. Otherwise the verdict is ambiguous if two to {settings.most_alternatives} "
+        f"alternatives together reach {format_number(100.0 * settings.covered)} %, and unresolved if more are needed. "
+        "It is unknown if the candidates outside the catalogue have the majority of the probability."
     )
     if result.bodies_fixed:
         yield (
-            "Every fit of the present model drove its bodies to where their prior all but excludes them. They are held "
-            "at the prior's centre, and what each candidate changes is computed along the motion that the data show."
+            "Every fit of the present model drove its bodies to values that their prior all but excludes. The bodies "
+            "are therefore fixed at the prior's centre, and the effect of each candidate is computed along the motion "
+            "in the data."
         )
     if result.bounded is not None:
         yield result.bounded
@@ -122,7 +124,7 @@ def computation_sentence(result: Diagnosis) -> str:
     """Return how long each phase of the diagnosis took."""
     phases = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.seconds.items())
     total = sum(result.seconds.values())
-    return f"Time by phase: {phases}; {total:.1f} s until the verdict, without sampling and this report."
+    return f"Time by phase: {phases}; {total:.1f} s until the verdict, excluding sampling and this report."
 
 
 def unseen_rows(rows: Sequence[Candidate]) -> Rows:

@@ -1,6 +1,6 @@
-"""Figures of the reports; every function returns a matplotlib Figure, and none touches pyplot or its settings.
+"""Figures of the reports; every function returns a matplotlib Figure, and none changes pyplot or its settings.
 
-Those called ``plot_`` are for users too: they take a result, and axes of the user's own.
+Those called ``plot_`` are also for users: they take a result, and optionally the user's axes.
 """
 
 from bayesid.report.figures.design_figures import (

@@ -182,7 +182,7 @@ def _draw_limits(axes: Axes, values: Floats, bounds: set[float], unit: str) -> N
 
 @styled
 def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
-    """Draw the mean trajectory of one body with a band of ± 2 sd, and twice the standard deviation beside it."""
+    """Draw the mean trajectory of one body with a band of ± 2 sd, and twice the standard deviation next to it."""
     poses = [trajectory.pose(index) for index in range(len(trajectory.time))]
     figure = wide_figure(3.2)
     panels = figure.subplots(2, 2, sharex=True)
@@ -271,14 +271,14 @@ def loop_progress(steps: Sequence[dict[str, Any]]) -> Figure:
             items = [step["identification"]["bodies"][name][key] for step in steps]
             ratio = [100.0 * item["sd"] / abs(item["mean"]) for item in items]
             known.plot(numbers, ratio, marker=mark, markersize=3.5, color=colour, label=f"{name} {key}", alpha=0.8)
-    known.set(yscale="log", xlabel="step", ylabel="standard deviation / mean [%]", title="What is known")
+    known.set(yscale="log", xlabel="step", ylabel="standard deviation / mean [%]", title="Relative uncertainty")
     names = list(dict.fromkeys(key for step in steps for key in step["plan"]["attempts"][-1]["limits"]))
     for colour, name in zip(COLOURS, names, strict=False):
         entries = [step["plan"]["attempts"][-1]["limits"].get(name) for step in steps]
         used = [np.nan if item is None else 100.0 * item["quantile_99"] / item["limit"] for item in entries]
         limits.plot(numbers, used, marker="o", markersize=3.5, color=colour, label=name.replace("_", " "))
     limits.axhline(100.0, color="black", linewidth=0.8, linestyle="--")
-    limits.set(xlabel="step", ylabel="99 % quantile / limit [%]", title="Limits that depend on what is known")
+    limits.set(xlabel="step", ylabel="99 % quantile / limit [%]", title="Limits affected by the uncertainty")
     limits.set_ylim(0.0, 110.0)
     for axes in (known, limits):
         axes.set_xticks(numbers)

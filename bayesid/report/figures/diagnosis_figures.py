@@ -248,7 +248,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 
 def plot_disturbance(result: Diagnosis, frame: str | Frame = Frame.BASE, *, axes: Any = None) -> Figure:
-    """Draw the torque, and the force where it is seen, that would explain the residual, and that of the named causes.
+    """Draw the torque, and the force if observable, that would explain the residual, and that of the named causes.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def plot_disturbance(result: Diagnosis, frame: str | Frame = Frame.BASE, *, axes
     frame : str or Frame
         Axes: ``"base"``, ``"orbit"`` or ``"inertial"``.
     axes : array_like of Axes, optional
-        Panels to draw in, three for the torque and three for the force where it is seen; by default of a new figure.
+        Panels to draw in, three for the torque and three for the force if observable; by default of a new figure.
     """
     cause = torque_of_causes(result.after) if result.named else None
     return wrench_histories(result.disturbance, Frame(frame), cause, axes)
@@ -266,7 +266,7 @@ def plot_disturbance(result: Diagnosis, frame: str | Frame = Frame.BASE, *, axes
 def wrench_histories(
     wrench: DisturbingWrench, frame: Frame, cause: Sequence[Floats] | None = None, axes: Any = None
 ) -> Figure:
-    """Draw a reconstructed torque, and force where it is seen, over time in the axes of one frame, ± 1 sd in base axes.
+    """Draw a reconstructed torque, and force if observable, over time in the axes of one frame, ± 1 sd in base axes.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def wrench_histories(
     cause : sequence of (S, 3) arrays, optional
         Torque of the named causes in each recording, in the same axes, drawn over the reconstructed one.
     axes : array_like of Axes, optional
-        Panels to draw in, three for the torque and three for the force where it is seen; by default of a new figure.
+        Panels to draw in, three for the torque and three for the force if observable; by default of a new figure.
     """
     families = [("torque", "N m", wrench.torque[frame], wrench.torque_sd)]
     if all(np.isfinite(force).all() for force in wrench.force[frame]):
@@ -352,7 +352,7 @@ def parameter_forest(changes: Sequence[ParameterChange], named: bool = True) -> 
     axes.axvline(0.0, color="black", linewidth=0.5)
     axes.set_yticks(rows, [item.name for item in changes])
     axes.set_ylim(-0.6, len(changes) - 0.4)
-    axes.set_xlabel("distance from the value given [widths of the prior]")
+    axes.set_xlabel("distance from the given value [prior widths]")
     axes.grid(visible=False, axis="y")
     axes.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.14))
     return figure

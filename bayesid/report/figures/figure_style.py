@@ -159,7 +159,7 @@ def panels_of(axes: Any, rows: int, columns: int, height: float, **layout: Any) 
         return figure, figure.subplots(rows, columns, squeeze=False, **layout)
     given = np.asarray(axes, dtype=object).ravel()
     if given.size != rows * columns:
-        remedy = f"Give those of matplotlib's subplots({rows}, {columns}), or none for a new figure"
+        remedy = f"Use the axes of matplotlib's subplots({rows}, {columns}), or none for a new figure"
         raise InputError(f"{given.size} axes are given where {rows * columns} are needed", remedy=remedy)
     return given[0].get_figure(root=True), given.reshape(rows, columns)
 

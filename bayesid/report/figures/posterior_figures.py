@@ -67,7 +67,7 @@ LOOK = {
 def plot_posterior(result: Identification | BodyDraws, name: str | None = None, *, axes: Any = None) -> Figure:
     """Draw the joint distributions of one body's ten quantities about their means, in posterior standard deviations.
 
-    The contours hold 50 % and 90 % of the draws.
+    The contours contain 50 % and 90 % of the draws.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def plot_posterior(result: Identification | BodyDraws, name: str | None = None, 
     name : str, optional
         Name of the link or load, by default the first that was identified.
     axes : (10, 10) array_like of Axes, optional
-        Panels to draw in, of which those above the diagonal are hidden, by default those of a new figure.
+        Panels to draw in, by default those of a new figure; those above the diagonal are hidden.
     """
     bodies = result.bodies if isinstance(result, Identification) else {result.name: result}
     name = next(iter(bodies), "") if name is None else name
@@ -197,7 +197,7 @@ def prior_to_posterior(result: Identification) -> Figure:
     axes.set_yticks(rows, names)
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(False, axis="y")
-    axes.set_xlabel("width of the posterior over width of the prior (half the range of the central 68 %)")
+    axes.set_xlabel("width of the posterior / width of the prior (half the central 68 % range)")
     return figure
 
 
@@ -217,7 +217,7 @@ def convergence(result: Identification) -> Figure:
         _draw_ranks(panels[row, 1], draws)
         panels[row, 0].set_title(f"{result.posterior.unknowns.names[coordinate]}, R-hat {r_hat[coordinate]:.4f}")
         panels[row, 0].set_ylabel("running mean [sd]")
-        panels[row, 1].set_ylabel("draws over even")
+        panels[row, 1].set_ylabel("relative density")
     panels[-1, 0].set_xlabel("step after burn-in")
     panels[-1, 1].set_xlabel("rank among all draws")
     text = (
@@ -303,5 +303,5 @@ def displacements(directions: Sequence[Direction], prior_sd: Floats) -> Figure:
     for body in range(1, len(rows)):
         if names[body].split(".")[0] != names[body - 1].split(".")[0]:
             axes.axhline(body - 0.5, color="black", linewidth=0.5)
-    figure.colorbar(image, ax=axes, label="displacement over the largest", aspect=30)
+    figure.colorbar(image, ax=axes, label="displacement / largest displacement", aspect=30)
     return figure

@@ -51,7 +51,7 @@ PARTS = 40  # number of windows that a recording is cut into for the running mea
 SIDES = (("before", COLOURS[1]), ("after", COLOURS[0]))
 """Names and colours of the residuals of the present model and of the extended one."""
 
-NOISE_BAND = "95 % of bins, were it only noise"
+NOISE_BAND = "95 % of bins for noise alone"
 """Legend of the band that holds the bins of a spectrum if the residuals are noise alone."""
 
 

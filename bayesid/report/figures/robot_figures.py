@@ -43,7 +43,7 @@ GLASS = 0.3  # opacity of a box in place of the base's shape, which may hold oth
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction of the light that shades shapes
 BASE, LINKS = "#8fbcdb", ("#e0b04c", "#b9b9b9")  # colours of the base and, by turns, of the links
 
-VIEWS = (("seen along −z", 0, 1), ("seen along y", 0, 2), ("seen along −x", 1, 2))
+VIEWS = (("view along −z", 0, 1), ("view along y", 0, 2), ("view along −x", 1, 2))
 """Title, axis along and axis up of each projection."""
 
 
@@ -154,7 +154,7 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
 
 @styled
 def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, ax: Any = None) -> Figure:
-    """Draw a robot in space: its meshes where they are there, else primitives or boxes of the same inertia.
+    """Draw a robot in space: its meshes if available, otherwise primitives or boxes of the same inertia.
 
     Parameters
     ----------
@@ -169,11 +169,11 @@ def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, 
     given = rest if position is None else np.asarray(position, dtype=float)
     if given.shape != rest.shape:
         names = ", ".join(joint.name for joint in robot.joints)
-        raise InputError(f"{given.size} positions for {rest.size} joints", remedy=f"Give those of {names}")
+        raise InputError(f"{given.size} positions for {rest.size} joints", remedy=f"Give the positions of {names}")
     if ax is None:
         ax = PageFigure(figsize=(WIDTH, 3.8)).add_axes((0.1, 0.05, 0.8, 0.95), projection="3d")
     elif not hasattr(ax, "zaxis"):
-        raise InputError("the axes are flat", remedy='Make them by figure.add_subplot(projection="3d")')
+        raise InputError("the axes are flat", remedy='Create them with figure.add_subplot(projection="3d")')
     state = given.reshape(1, -1)
     pose = kinematics(robot, JointState(state, 0.0 * state, 0.0 * state)).pose[0]
     faces, colours, links = [], [], []
@@ -256,4 +256,4 @@ def _symbols(axes: Axes) -> None:
     """Add the symbols to the legend."""
     axes.plot([], [], "s", color="#cfe3f1", markeredgecolor="#0072B2", label="base, as a homogeneous box")
     axes.plot([], [], "+", color="#0072B2", label="origin of the base frame")
-    axes.plot([], [], "X", color="#666666", label="centre of mass of the whole")
+    axes.plot([], [], "X", color="#666666", label="centre of mass of the robot")

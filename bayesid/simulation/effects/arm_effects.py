@@ -75,8 +75,8 @@ class _OnLink(Placed):
         nominal = robot.link(self.place).inertial
         if not nominal.is_extended:
             raise InputError(
-                f"effect {self.label!r}: the link is no body with volume",
-                remedy="Name the link with mass that it is fixed on",
+                f"effect {self.label!r}: the link is not a body with volume",
+                remedy="Name the link with mass to which it is fixed",
             )
         changed = copy.copy(self)
         changed.factor, changed.vector = upper_cholesky(nominal.pseudo_inertia), nominal.vector
@@ -110,7 +110,7 @@ class _OnLink(Placed):
     def _attached(self) -> tuple[Array, Array]:
         """Factor of the nominal link's pseudo-inertia and its ten parameters."""
         if self.factor is None or self.vector is None:
-            raise InputError(f"effect {self.label!r} belongs to no model yet", remedy="Put it into a Model")
+            raise InputError(f"effect {self.label!r} does not yet belong to a model", remedy="Add it to a Model")
         return jnp.asarray(self.factor), jnp.asarray(self.vector)
 
 
@@ -157,17 +157,17 @@ class _LinkMoments(Placed):
 
 @register
 class Payload(_OnLink):
-    """Rigid body that is fixed on a link and missing in the model.
+    """Rigid body that is fixed to a link and missing from the model.
 
     At one standard deviation of the prior, the mass of the link is wrong by a factor of e^2.
     """
 
     name = "payload"
     is_added_body = True
-    summary = "A body that the model lacks is fixed on the link, such as a tool or a captured body."
+    summary = "A body that is missing from the model is fixed to the link, such as a tool or a captured body."
     separated_by = (
-        "It moves with its link: move that joint through another range with the other joints still, and with the wrist "
-        "in another posture, so that mass, centre of mass and inertia act apart."
+        "It moves with its link: move that joint through a different range with the other joints still, and with the "
+        "wrist in a different posture, to separate the effects of mass, centre of mass and inertia."
     )
 
     @property
@@ -200,15 +200,15 @@ class Payload(_OnLink):
 class LinkInertia(_OnLink):
     """Error of one link's inertial parameters, with a prior of 10 % in log-Cholesky coordinates and 20 % in mass.
 
-    Its amplitudes are those coordinates: an error of a drawing is one of its own mass, extent and centre, and a link
-    with a little more mass everywhere differs in one of them, but in all ten moments about its origin.
+    Its amplitudes are those coordinates: a drawing error affects the link's mass, extent and centre, and a link with
+    slightly more mass everywhere differs in one coordinate, but in all ten moments about its origin.
     """
 
     name = "link-inertia"
-    summary = "The link's mass, centre of mass or inertia differ from the model's (CAD) values."
+    summary = "The link's mass, centre of mass or inertia differs from the model (CAD) values."
     separated_by = (
-        "It moves with its link: move that joint through another range with the other joints still; two neighbouring "
-        "links act apart only if the joint between them moves alone."
+        "It moves with its link: move that joint through a different range with the other joints still; two "
+        "neighbouring links can be distinguished only if the joint between them moves alone."
     )
     spread = 0.1
 
@@ -217,5 +217,5 @@ class LinkInertia(_OnLink):
         mass = LINK_ERROR * model.robot.link(self.place).inertial.mass
         share = f"{100.0 * LINK_ERROR:g} % of the link's mass, {three_digits(mass)} kg"
         return (
-            PhysicalBound("1", 0.5 * float(np.log1p(LINK_ERROR)), f"A drawing misses or misplaces at most {share}."),
+            PhysicalBound("1", 0.5 * float(np.log1p(LINK_ERROR)), f"A drawing omits or misplaces at most {share}."),
         )

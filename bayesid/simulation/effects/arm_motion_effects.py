@@ -84,14 +84,14 @@ class _DisplacedMotion(Effect):
 class EncoderOffset(_DisplacedMotion, OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
-    The prior of 0.02 rad is about one degree; that of a slide is 0.02 m.
+    The prior of 0.02 rad is about one degree; that of a prismatic joint is 0.02 m.
     """
 
     name = "encoder-offset"
-    summary = "The joint's encoder has a wrong zero: the arm is in another posture than the recording says."
+    summary = "The joint's encoder has a wrong zero: the posture of the arm differs from the recorded posture."
     separated_by = (
-        "It acts as a wrong posture: move that joint through another range with the others still; the offset stays the "
-        "same, an error of a mass does not."
+        "It acts like a wrong posture: move that joint through a different range with the others still; the offset "
+        "remains constant, whereas an apparent mass error changes."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
@@ -106,11 +106,13 @@ class EncoderOffset(_DisplacedMotion, OnJoint):
         return changed
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return an error of the zero that the eye would see."""
+        """Return a zero error that is visible to the eye."""
         if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
-            reason = f"A slide whose zero is wrong by more than {LARGEST_OFFSET_OF_SLIDE:g} m is seen with the eye."
+            reason = (
+                f"On a prismatic joint, a zero error of more than {LARGEST_OFFSET_OF_SLIDE:g} m is visible to the eye."
+            )
             return (PhysicalBound("m", LARGEST_OFFSET_OF_SLIDE, reason),)
-        reason = f"A joint whose zero is wrong by more than {LARGEST_OFFSET:g} rad, six degrees, is seen with the eye."
+        reason = f"On a joint, a zero error of more than {LARGEST_OFFSET:g} rad, six degrees, is visible to the eye."
         return (PhysicalBound("rad", LARGEST_OFFSET, reason),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
@@ -142,10 +144,10 @@ class JointLatency(_DisplacedMotion):
     """
 
     name = "joint-latency"
-    summary = "The recorded joint motion is late: the arm has moved on from where the recording says it is."
+    summary = "The recorded joint motion is late: the arm is already ahead of its recorded position."
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
-        "those of a delay grow with frequency."
+        "It grows with speed: repeat the same motion twice as fast; the effects of body errors remain proportional to "
+        "the motion, whereas those of a delay grow with frequency."
     )
 
     @classmethod
@@ -158,7 +160,7 @@ class JointLatency(_DisplacedMotion):
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return a cycle of slow telemetry."""
-        return (PhysicalBound("s", LARGEST_DELAY, "A slow telemetry stamps its samples once in a second."),)
+        return (PhysicalBound("s", LARGEST_DELAY, "Slow telemetry stamps its samples once per second."),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the coefficients of the quartic through five samples in time."""
@@ -175,18 +177,20 @@ class JointLatency(_DisplacedMotion):
 class JointFlexibility(_DisplacedMotion, OnJoint):
     """Compliance of a joint, whose link side follows the measured motor side on a damped spring.
 
-    ``frequency`` is that of all bodies beyond the joint on the spring, with the base held and all joints at zero, so
+    ``frequency`` is that of all bodies beyond the joint on the spring, with the base fixed and all joints at zero, so
     that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint if the
-    motion is slow against that frequency; it is computed to second order in the ratio of frequencies, which is accurate
-    above about 0.2 Hz. Where the acceleration of the joints jumps the spring rings, which is left out: with trapezoidal
-    speeds something remains beside the joint's compliance. The deflection and the displacement of the links are
-    computed with the bodies of the robot, and with the centres of the priors for unknown ones: the displacement of a
-    load far from its prior's centre is wrong.
+    motion is slow compared with that frequency; it is computed to second order in the ratio of frequencies, which is
+    accurate above about 0.2 Hz. The ringing of the spring after jumps of the joint acceleration is omitted: with
+    trapezoidal speed profiles a residual remains in addition to the joint's compliance. The deflection and the
+    displacement of the links are computed with the bodies of the robot, and with the centres of the priors for unknown
+    ones: the displacement of a load far from its prior's centre is wrong.
     """
 
     name = "joint-flexibility"
-    summary = "The joint's gear is elastic: the bodies beyond it lag behind the encoder when the arm accelerates."
-    separated_by = "It grows with the joint's acceleration: repeat the motion of that joint twice as fast."
+    summary = (
+        "The joint's gear is elastic: the bodies beyond the joint lag behind the encoder when the arm accelerates."
+    )
+    separated_by = "It grows with the joint's acceleration: repeat the motion of that joint at twice the speed."
 
     def __init__(self, place: str = "", frequency: float = 1.0, spread: float = 0.7) -> None:
         super().__init__(place)
@@ -217,10 +221,12 @@ class JointFlexibility(_DisplacedMotion, OnJoint):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the compliance of the softest joints, and the lag of strong damping in them."""
         omega = 2.0 * float(np.pi) * SOFTEST
-        soft = f"Only the longest arms with heavy payloads swing as slowly as {SOFTEST:g} Hz"
+        soft = f"Only the longest arms with heavy payloads have frequencies as low as {SOFTEST:g} Hz"
         return (
             PhysicalBound("s2", omega**-2, f"{soft}."),
-            PhysicalBound("s3", 2.0 * STRONGEST_DAMPING * omega**-3, f"{soft}, with {STRONGEST_DAMPING:g} of damping."),
+            PhysicalBound(
+                "s3", 2.0 * STRONGEST_DAMPING * omega**-3, f"{soft}, with a damping ratio of {STRONGEST_DAMPING:g}."
+            ),
         )
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
@@ -282,26 +288,26 @@ FINE = 20
 
 @register
 class JointBacklash(_DisplacedMotion, OnJoint):
-    """Play of a joint: the link lies off the encoder, at one side of a gap, and crosses it now and then.
+    """Play of a joint: the link is offset from the encoder, at one side of a gap, and occasionally crosses the gap.
 
-    What presses it to a side is one of two things. Without friction it is the torque through the joint: the flank that
-    drives the link presses it from behind, so that it lags the way it is accelerated. Where the torque changes its sign
-    the link coasts from one flank to the other; how long that takes follows from the slope of the torque and a gap of
-    `TYPICAL_GAP`; the impact at the end is left out. The torque is that of the robot's bodies, with the centres of the
-    priors for unknown ones. With friction, such as that of its bearing and cables, the link lags the way it moves.
-    Where the joint turns back, either the encoder moves on evenly and the link waits until it has come across the gap,
-    or the link moves on evenly and the encoder leaps, which is seen as the smoothing of the recording shows it. Of a
-    gear with some friction each has a share.
+    One of two mechanisms presses it to a side. Without friction it is the torque through the joint: the flank that
+    drives the link presses it from behind, so that it lags in the direction of its acceleration. When the torque
+    changes its sign, the link coasts from one flank to the other; the duration follows from the slope of the torque
+    and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
+    the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link lags
+    in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits
+    until the gap is crossed, or the link moves on evenly and the encoder leaps, which appears as in the smoothed
+    recording. In a gear with some friction, each mechanism has a share.
     """
 
     name = "joint-backlash"
     summary = (
-        "The joint has play: the bodies beyond it shift by the gap where the torque through the joint reverses or, "
-        "with friction, where the joint turns back."
+        "The joint has play: the bodies beyond it shift by the gap when the torque through the joint reverses or, with "
+        "friction, when the joint reverses its motion."
     )
     separated_by = (
-        "It jumps where the joint's torque changes its sign or the joint turns back, by the same angle however fast "
-        "the motion is: accelerate and brake that joint slowly and fast."
+        "It jumps when the joint's torque or motion reverses, by the same angle at any speed: accelerate and brake "
+        "that joint slowly and fast."
     )
 
     def __init__(self, place: str = "", sigma: float = TYPICAL_GAP) -> None:
@@ -316,11 +322,11 @@ class JointBacklash(_DisplacedMotion, OnJoint):
         return changed
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return a play that the hand would feel."""
+        """Return a play that can be felt by hand."""
         if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
-            reason = f"A slide with more than {LARGEST_GAP_OF_SLIDE:g} m of play is felt with the hand."
+            reason = f"On a prismatic joint, more than {LARGEST_GAP_OF_SLIDE:g} m of play can be felt by hand."
             return (PhysicalBound("m", LARGEST_GAP_OF_SLIDE, reason),)
-        reason = f"A joint with more than {LARGEST_GAP:g} rad of play, half a degree, is felt with the hand."
+        reason = f"On a joint, more than {LARGEST_GAP:g} rad of play, half a degree, can be felt by hand."
         return (PhysicalBound("rad", LARGEST_GAP, reason),)
 
     @property

@@ -26,8 +26,8 @@ class BiasJump(Events):
 
     sensor: ClassVar[SensorKind]
     separated_by = (
-        "The reading jumps and the robot does not: another sensor sees nothing, and the attitude follows the old bias. "
-        "Record at rest: an instrument that jumps, as after a change of its range or its supply, jumps there, too."
+        "The reading jumps but the robot does not: other sensors do not respond, and the attitude follows the old "
+        "bias. Record at rest: an instrument that jumps, for example after a range or supply change, does so at rest."
     )
 
     @classmethod
@@ -56,7 +56,7 @@ class RateBiasJump(BiasJump):
     """Jump of the gyro's constant error."""
 
     name = "rate-bias-jump"
-    summary = "The constant error of the gyro jumps at one instant, as after a change of its temperature or range."
+    summary = "The bias of the gyro jumps at one instant, for example after a change of temperature or range."
     sensor = SensorKind.RATE
     amplitude = _of_axes(SensorKind.RATE)
 
@@ -66,6 +66,6 @@ class AccelBiasJump(BiasJump):
     """Jump of the accelerometer's constant error."""
 
     name = "accel-bias-jump"
-    summary = "The constant error of the accelerometer jumps at one instant, as after a shock or a change of its range."
+    summary = "The bias of the accelerometer jumps at one instant, for example after a shock or a change of range."
     sensor = SensorKind.ACCEL
     amplitude = _of_axes(SensorKind.ACCEL)

@@ -32,7 +32,7 @@ __all__ = ["Effect", "Situation", "bounds_by_label"]
 
 
 class Situation(Protocol):
-    """What an effect may know of the `Model` that it is part of, or would be."""
+    """Information for an effect on the `Model` that contains it, or would contain it."""
 
     @property
     def robot(self) -> Robot:
@@ -103,15 +103,15 @@ class Effect:
 
     @classmethod
     def lacks(cls, model: Situation) -> str | None:
-        """Return what a model does not have and the effect cannot act or show without, None where nothing is lacking.
+        """Return what the effect requires and the model lacks, None if nothing is missing.
 
-        By default that is the orbit, for an effect that exists only there.
+        By default that is the orbit, for an effect that exists only in orbit.
         """
         return "[orbit]" if cls.needs_orbit and model.orbit is None else None
 
     @classmethod
     def instances(cls, model: Situation) -> Sequence[Effect]:
-        """Return the effect at every place of a model's robot where it can occur and show in the model's sensors.
+        """Return the effect at every place of a model's robot where it can occur and affect the model's sensors.
 
         By default it occurs once; it does not occur if the model lacks what it needs, or if the class needs arguments,
         such as a place, which cannot be guessed.
@@ -164,7 +164,7 @@ class Effect:
         return self
 
     def shows_in(self, recordings: Sequence[Recording], blocks_per_second: float = 0.0) -> bool:
-        """Return whether recordings could show the effect, by default that they could.
+        """Return whether recordings can resolve the effect, by default true.
 
         Parameters
         ----------
@@ -271,7 +271,7 @@ class Effect:
 
     @property
     def candidate(self) -> str:
-        """Name of the candidate cause of which the effect is a form; several forms may share one."""
+        """Name of the candidate cause that the effect is a form of; several forms may share one."""
         return self.label
 
     @property
@@ -459,7 +459,7 @@ def bounds_by_label(
     model : Situation
         Robot and orbit from which the bounds follow.
     stated : mapping of str to sequence of PhysicalBound, optional
-        Bounds by label that the user knows better; each replaces that of its unit.
+        Bounds by label that the user states; each replaces the bound of its unit.
 
     Raises
     ------
@@ -470,7 +470,8 @@ def bounds_by_label(
     for label, better in ({} if stated is None else stated).items():
         if label not in bounds:
             raise InputError(
-                f"a bound is stated for {label!r}, which does not occur", remedy=f"Choose from {', '.join(bounds)}"
+                f"a bound is stated for {label!r}, which is not among the effects",
+                remedy=f"Choose from {', '.join(bounds)}",
             )
         for bound in better:
             if bound.unit not in bounds[label]:

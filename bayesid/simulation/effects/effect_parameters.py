@@ -130,7 +130,7 @@ class PhysicalBound:
     largest : float
         Largest plausible magnitude, in that unit.
     reason : str
-        One sentence on why no more is plausible.
+        One sentence on why larger sizes are implausible.
 
     Raises
     ------
@@ -152,7 +152,7 @@ class PhysicalBound:
         if not self.reason:
             raise InputError(
                 f"the largest size {self.largest:g} {self.unit} has no reason",
-                remedy="Say in one sentence why no more is plausible",
+                remedy="State in one sentence why larger sizes are implausible",
             )
 
 
@@ -167,6 +167,6 @@ def bounds_of_priors(parameters: Sequence[Parameter]) -> tuple[PhysicalBound, ..
     for unit in dict.fromkeys(parameter.unit for parameter in parameters):
         group = [parameter for parameter in parameters if parameter.unit == unit]
         ends = [float(abs(parameter.value(np.array([-SPREADS, SPREADS]))).max()) for parameter in group]
-        reason = f"No physical bound is stated; this is the size at {SPREADS:g} standard deviations of the prior."
+        reason = f"No physical bound is stated; this size is {SPREADS:g} standard deviations of the prior."
         bounds.append(PhysicalBound(unit, max(ends), reason))
     return tuple(bounds)

@@ -73,12 +73,12 @@ class GravityGradient(Effect):
 
     name = "gravity-gradient"
     summary = (
-        "Gravity is stronger on parts nearer the Earth. The difference over the robot's extent turns it, "
-        "and an accelerometer away from the centre of mass feels it."
+        "Gravity is stronger on parts nearer the Earth. The difference over the robot's extent causes a torque, "
+        "and an accelerometer away from the centre of mass measures it."
     )
     separated_by = (
-        "It turns with the direction of the Earth: repeat with the base turned to another attitude, or with the arm "
-        "stretched along another axis."
+        "It follows the direction of the Earth: repeat with the base in a different attitude, or with the arm "
+        "stretched along a different axis."
     )
     needs_orbit = True
 
@@ -178,7 +178,7 @@ def _pressure_bounds(kind: type[_Pressure], model: Situation) -> tuple[PhysicalB
     pressure, reason = kind.largest_pressure(model)
     size = RobotSize.of(model.robot)
     lever = size.area_moment / size.area
-    presses = f"{reason} presses on {three_digits(size.area)} m2"
+    presses = f"{reason} acts on {three_digits(size.area)} m2"
     return (
         PhysicalBound("N", pressure * size.area, f"{presses}."),
         PhysicalBound(
@@ -189,7 +189,7 @@ def _pressure_bounds(kind: type[_Pressure], model: Situation) -> tuple[PhysicalB
 
 @register
 class AerodynamicDrag(_Pressure):
-    """Constant drag against the orbital motion, at a centre of pressure beside the centre of mass.
+    """Constant drag against the orbital motion, at a centre of pressure offset from the centre of mass.
 
     The prior's median of 5 mN is the drag of ten square metres at 350 km; its spread of 1.5 in the logarithm stands for
     density and area. The centre of pressure lies within two metres of the base origin along each axis.
@@ -197,10 +197,10 @@ class AerodynamicDrag(_Pressure):
 
     name = "aerodynamic-drag"
     summary = (
-        "The thin air of a low orbit pushes against the direction of flight. Where the push acts beside the "
-        "centre of mass it also turns the robot, and the turn follows the attitude to the direction of flight."
+        "The thin air of a low orbit exerts a force against the direction of flight. If the force is offset from "
+        "the centre of mass, it also causes a torque, which depends on the attitude to the direction of flight."
     )
-    separated_by = "It keeps the direction of flight: repeat with the base turned to another attitude."
+    separated_by = "Its direction is fixed to the direction of flight: repeat with the base in a different attitude."
 
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
@@ -209,13 +209,13 @@ class AerodynamicDrag(_Pressure):
     def largest_pressure(model: Situation) -> tuple[float, str]:
         """Return the drag per area at the lowest point of the orbit in the densest air there."""
         if model.orbit is None:
-            raise InputError("drag of the upper atmosphere exists only in orbit", remedy="Give the orbit")
+            raise InputError("drag of the upper atmosphere exists only in orbit", remedy="State the orbit")
         altitude, speed = model.orbit.perigee_altitude, model.orbit.perigee_speed
         density = largest_density(altitude)
         return (
             0.5 * density * speed**2 * DRAG_COEFFICIENT,
-            f"Air of {density:.2g} kg/m3, the densest at {1e-3 * altitude:.0f} km at solar maximum, met at "
-            f"{1e-3 * speed:.2f} km/s with a drag coefficient of {DRAG_COEFFICIENT:g},",
+            f"Air of {density:.2g} kg/m3, the densest at {1e-3 * altitude:.0f} km at solar maximum, with a relative "
+            f"speed of {1e-3 * speed:.2f} km/s and a drag coefficient of {DRAG_COEFFICIENT:g},",
         )
 
     @staticmethod
@@ -226,7 +226,7 @@ class AerodynamicDrag(_Pressure):
 
 @register
 class SolarPressure(_Pressure):
-    """Constant radiation pressure from the Sun's direction, at a centre of pressure beside the centre of mass.
+    """Constant radiation pressure from the Sun's direction, at a centre of pressure offset from the centre of mass.
 
     The prior's median of 0.3 mN is that of 66 square metres of absorbing panel; its spread of 2 in the logarithm stands
     for area and reflection.
@@ -234,18 +234,18 @@ class SolarPressure(_Pressure):
 
     name = "solar-pressure"
     summary = (
-        "Sunlight pushes the robot away from the Sun. Where the push acts beside the centre of mass it also turns "
-        "the robot, about an axis that stays with the stars."
+        "Sunlight exerts a force away from the Sun. If the force is offset from the centre of mass, it also causes a "
+        "torque about an axis perpendicular to the direction of the Sun."
     )
     separated_by = (
-        "It keeps the direction of the Sun and ends in eclipse: repeat with the base turned to another attitude, or on "
-        "the orbit's night side."
+        "Its direction is fixed to the Sun and it vanishes in eclipse: repeat with the base in a different attitude, "
+        "or in eclipse."
     )
     needs_latitude = True
 
     @classmethod
     def lacks(cls, model: Situation) -> str | None:
-        """Return the orbit or the direction of the Sun where it is not known."""
+        """Return the orbit or the direction of the Sun if it is not known."""
         return super().lacks(model) or ("sun in [orbit]" if model.orbit is None or model.orbit.sun is None else None)
 
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
@@ -254,7 +254,7 @@ class SolarPressure(_Pressure):
     @staticmethod
     def largest_pressure(model: Situation) -> tuple[float, str]:
         """Return the pressure of sunlight on a mirror that faces the Sun."""
-        return MIRROR * SUNLIGHT, f"Sunlight of {1e6 * SUNLIGHT:.3g} micropascal, which a mirror reflects back,"
+        return MIRROR * SUNLIGHT, f"Sunlight of {1e6 * SUNLIGHT:.3g} micropascal, reflected by a mirror,"
 
     @staticmethod
     def direction(instant: Instant) -> Array:
@@ -270,17 +270,17 @@ class MagneticDipole(Effect):
     """
 
     name = "magnetic-dipole"
-    summary = "Currents and magnets on board make the base a compass needle in the Earth's magnetic field."
+    summary = "Currents and magnets on board act like a compass needle in the Earth's magnetic field."
     separated_by = (
-        "It follows the Earth's field along the orbit: repeat at another argument of latitude, a quarter of an orbit "
-        "away, and in another attitude."
+        "It follows the Earth's field along the orbit: repeat a quarter of an orbit later, at a different argument of "
+        "latitude, and in a different attitude."
     )
     needs_latitude = True
     needs_orbit = True
 
     @classmethod
     def lacks(cls, model: Situation) -> str | None:
-        """Return the orbit or its inclination, and with it the direction of the field, where it is not known."""
+        """Return the orbit or its inclination, which gives the direction of the field, if it is not known."""
         inclination = None if model.orbit is None else model.orbit.inclination
         return super().lacks(model) or ("inclination in [orbit]" if inclination is None else None)
 
@@ -288,11 +288,11 @@ class MagneticDipole(Effect):
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the dipole of a spacecraft of the robot's mass that was built without regard to magnetism."""
+        """Return the dipole of a spacecraft of the robot's mass that was built without magnetic control."""
         mass = model.robot.mass
         reason = (
-            "A spacecraft that was built without regard to magnetism keeps 1 A m2 per 100 kg (NASA SP-8018, class "
-            f"III); the robot has {three_digits(mass)} kg."
+            "A spacecraft built without magnetic control has a residual dipole of 1 A m2 per 100 kg (NASA SP-8018, "
+            f"class III); the robot has {three_digits(mass)} kg."
         )
         return (PhysicalBound("A m2", DIPOLE * mass, reason),)
 
@@ -311,11 +311,11 @@ class ThrusterLeak(Effect):
     """
 
     name = "thruster-leak"
-    summary = "A leaking valve pushes steadily with a force and a torque that are fixed in the base."
+    summary = "A leaking valve exerts a constant force and torque that are fixed in the base."
     separated_by = (
-        "It keeps its direction in the base: repeat with the base turned to another attitude, so that what is fixed in "
-        "the orbit or in inertial space changes its direction in base axes and the leak does not; record with the arm "
-        "at rest too."
+        "Its direction is fixed in the base: repeat with the base in a different attitude, so that forces fixed in the "
+        "orbit or in inertial space change their direction in base axes and the leak does not; also record with the "
+        "arm at rest."
     )
 
     def __init__(self, force: float = 0.05, torque: float = 0.05) -> None:
@@ -351,8 +351,8 @@ class RotationalDrag(Effect):
     """
 
     name = "rotational-drag"
-    summary = "The air of a laboratory, or a bearing, brakes the rotation of the base in proportion to its rate."
-    separated_by = "It brakes every rotation: let the base turn freely, with the arm at rest, at two rates."
+    summary = "Air in a laboratory, or a bearing, damps the rotation of the base in proportion to its rate."
+    separated_by = "It damps every rotation: let the base rotate freely at two rates with the arm at rest."
 
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
@@ -360,13 +360,13 @@ class RotationalDrag(Effect):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the coefficient that stops the base within ten seconds.
 
-        In orbit, air and eddy currents brake some million times less; what may act like this there is a control of the
-        rate that was taken to be off.
+        In orbit, air and eddy currents damp about a million times less; a rate controller that was assumed to be off
+        can act like this.
         """
         inertia = RobotSize.of(model.robot).inertia
         reason = (
-            f"A base of {three_digits(inertia)} kg m2 that loses its rotation within less than {BRAKING_TIME:g} s "
-            "would not be called free."
+            f"A base of {three_digits(inertia)} kg m2 that loses its rotation in less than {BRAKING_TIME:g} s is not "
+            "free-floating."
         )
         return (PhysicalBound("N m s", inertia / BRAKING_TIME, reason),)
 

@@ -67,7 +67,7 @@ class Events(Effect):
         except ValueError:
             event = Event(-1, 0.0)
         if event.recording < 0 or len(event.shape) != len(self.trial_shapes[0]):
-            problem = f"{self.name}: {text!r} is no event"
+            problem = f"{self.name}: {text!r} is not an event"
             raise InputError(problem, remedy=f"Write RECORDING@TIME, such as {self.name}:1@12.5,2@30")
         return event
 

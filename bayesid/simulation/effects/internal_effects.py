@@ -72,16 +72,16 @@ FUEL = 0.3
 class WheelMomentum(Effect):
     """Residual momentum of reaction wheels at constant speed, in base axes.
 
-    The prior of 1 N m s is the capacity of a small wheel, more than an inactive attitude control leaves.
+    The prior of 1 N m s is the capacity of a small wheel, more than the residual of an inactive attitude control.
     """
 
     name = "wheel-momentum"
     summary = (
-        "Reaction wheels left spinning make the base a gyroscope: turning it about one axis turns it about another."
+        "Spinning reaction wheels make the base a gyroscope: a rotation about one axis causes a rotation about another."
     )
     separated_by = (
-        "Its torque grows with the base's rate: repeat with the base turning faster, and about other axes; a torque "
-        "at rest does not come from wheels."
+        "Its torque grows with the base's rate: repeat with the base rotating faster and about other axes; a torque "
+        "at rest is not caused by wheels."
     )
 
     def __init__(self, sigma: float = 1.0) -> None:
@@ -99,7 +99,7 @@ class WheelMomentum(Effect):
 class _Vibration(Effect):
     """Common part of effects of a mass on a spring in the base."""
 
-    separated_by = "It continues to swing: excite it with one quick motion, then record with the arm at rest."
+    separated_by = "It continues to oscillate: excite it with one quick motion, then record with the arm at rest."
     cause_kind = "vibration"
     frequency: float = FREQUENCY
 
@@ -117,18 +117,18 @@ class _Vibration(Effect):
 
 @register
 class FlexibleAppendage(_Vibration):
-    """One vibration mode of a panel, boom or antenna, with its frequency with the base held, damping and coupling.
+    """One vibration mode of a panel, boom or antenna, with its frequency for a fixed base, damping and coupling.
 
     The momentum of unit modal speed has a linear part [sqrt(kg)] and an angular part about the base origin
     [sqrt(kg) m]; ``participation`` is the norm of the angular part, whose square is the inertia that vibrates. The
     prior of 5 sqrt(kg) m per axis corresponds to 25 kg m2, a pair of small panels, and that of 3 sqrt(kg) to 9 kg. The
-    centrifugal load on the mode is left out.
+    centrifugal load on the mode is omitted.
     """
 
     name = "flexible-appendage"
     summary = (
-        "A panel, boom or antenna on the base is not rigid: it lags behind the base and swings at its natural "
-        "frequency, and the base swings against it."
+        "A panel, boom or antenna on the base is flexible: it lags behind the base and oscillates at its natural "
+        "frequency, and the base reacts to it."
     )
     modes_count = 1
 
@@ -153,10 +153,10 @@ class FlexibleAppendage(_Vibration):
         return jnp.concatenate([values[:2], jnp.linalg.norm(coupling[3:])[None], sign * coupling])
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the roots of the mass that swings and of its inertia at the edge of the base about the base origin."""
+        """Return the roots of the oscillating mass and of its inertia at the edge of the base about the base origin."""
         size = RobotSize.of(model.robot)
         root = float(np.sqrt(APPENDAGES * size.mass))
-        swings = f"Panels and booms that swing are at most {100.0 * APPENDAGES:g} % of {three_digits(size.mass)} kg"
+        swings = f"Flexible panels and booms are at most {100.0 * APPENDAGES:g} % of {three_digits(size.mass)} kg"
         return (
             PhysicalBound("sqrt(kg)", root, f"{swings}."),
             PhysicalBound(
@@ -187,7 +187,7 @@ class FuelSlosh(_Vibration):
     """
 
     name = "fuel-slosh"
-    summary = "Fuel that does not fill its tank lags behind the base and swings back and forth in it."
+    summary = "Fuel in a partly filled tank lags behind the base and sloshes back and forth."
     modes_count = 3
 
     def __init__(self, mass: float = 10.0, reach: float = REACH) -> None:
@@ -206,7 +206,7 @@ class FuelSlosh(_Vibration):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the fuel that can slosh in a base of this mass."""
         mass = RobotSize.of(model.robot).base_mass
-        reason = f"At most half of a base of {three_digits(mass)} kg is fuel, of which at most 60 % sloshes."
+        reason = f"At most half of a base of {three_digits(mass)} kg is fuel, and at most 60 % of the fuel sloshes."
         return (PhysicalBound("kg", FUEL * mass, reason),)
 
     def attach(self, robot: Robot) -> Self:
@@ -268,7 +268,7 @@ def wheel_bound(robot: Robot) -> PhysicalBound:
     size = RobotSize.of(robot)
     radius = RIM_RADIUS * size.length
     reason = (
-        f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
-        f"at their rims of {radius:.2g} m radius."
+        f"The rotors of the wheels are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg and run at "
+        f"{RIM_SPEED:g} m/s at their rims of {radius:.2g} m radius."
     )
     return PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason)

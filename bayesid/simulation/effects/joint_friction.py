@@ -84,15 +84,15 @@ class _OnTorque(OnJoint):
 class JointFriction(_OnTorque):
     """Dry and viscous friction between motor and link: ``coulomb sign(v) + viscous v``.
 
-    Samples of a joint that stands nearly still are left out. The priors of 5 N m and 50 N m s/rad include the gears of
+    Samples of a nearly stationary joint are omitted. The priors of 5 N m and 50 N m s/rad include the gears of
     large manipulators. Friction appears in torques only, since the motion of the joints is measured.
     """
 
     name = "joint-friction"
-    summary = "The motor works against friction in the joint, which its torque sensor also reads."
+    summary = "The motor works against friction in the joint, which the torque sensor also measures."
     separated_by = (
-        "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant speeds, "
-        "forwards and back, with the others still."
+        "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant speeds in "
+        "both directions, with the others still."
     )
 
     def __init__(self, place: str = "", coulomb: float = 5.0, viscous: float = 50.0) -> None:
@@ -102,10 +102,10 @@ class JointFriction(_OnTorque):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the torque of the joint's drive, which could move nothing against more friction."""
         torque, drive = self.drive(model.robot)
-        moves = f"A joint moves only if its friction takes less than {drive}"
+        moves = f"A joint moves only if its friction is less than {drive}"
         return (
             PhysicalBound(self.parameters[0].unit, torque, f"{moves}."),
-            PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, and does so at a speed of {SPEED:g}."),
+            PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, at a speed of {SPEED:g}."),
         )
 
     def _extra(self, values: Array, velocity: Array) -> Array:
@@ -118,7 +118,7 @@ class TorqueBias(_OnTorque):
     """Constant error of a joint's torque sensor; the prior is 2 N m."""
 
     name = "torque-bias"
-    summary = "The torque sensor of the joint reads a constant without load."
+    summary = "The torque sensor of the joint reads a constant value without load."
     separated_by = (
         "It is present when the joint carries no load: read the torques at rest, before and after the motion."
     )

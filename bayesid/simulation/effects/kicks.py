@@ -25,29 +25,29 @@ collision."""
 class Kicks(Events):
     """Momentum and angular momentum that the robot receives from outside within much less than a sample interval.
 
-    What was received keeps its direction in inertial space: with ``x`` the angular momentum received so far about the
-    common centre of mass, ``x = sum (J - c x P) + u``, where ``u' = -w x x + sum c' x P`` carries it in base axes and
-    leaves the lever where it was at the instant. As a momentum taken from the base it changes the rate at once,
-    whatever the integration steps.
+    The received momentum is fixed in inertial space: with ``x`` the angular momentum received so far about the common
+    centre of mass, ``x = sum (J - c x P) + u``, where ``u' = -w x x + sum c' x P`` expresses it in base axes with the
+    lever of the instant. As a momentum taken from the base it changes the rate at once, for any step.
 
-    A sensor that samples between does not see the push itself. One kick changes the motion by ``J - c x P`` alone, so
-    that a diagnosis gives the angular momentum about the common centre of mass, with no momentum.
+    A sensor that samples between kicks does not measure the push itself. One kick changes the motion by
+    ``J - c x P`` alone, so that a diagnosis gives the angular momentum about the common centre of mass and no
+    momentum.
 
     Parameters
     ----------
     place : str
         As of `Events`.
     momentum : bool
-        Whether the momentum is a parameter, beside the angular momentum about the base origin.
+        Whether the momentum is a parameter, in addition to the angular momentum about the base origin.
     """
 
     name = "kicks"
     summary = (
-        "Something kicks the base from outside at an instant or a few, such as a contact or a part that separates."
+        "The base receives an external impulse at one or a few instants, such as a contact or the separation of a part."
     )
     separated_by = (
-        "The rates jump and stay: the momentum does not come back, as it does from a wheel or a panel. Repeat the "
-        "motion; a contact comes at the same posture, a hit from outside does not come again."
+        "The rates jump and do not recover, unlike the momentum exchanged with a wheel or a panel. Repeat the motion: "
+        "a contact recurs at the same posture, an external hit does not."
     )
     states = 3
     most_in_recording = 3
@@ -65,8 +65,8 @@ class Kicks(Events):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return what gives the base the largest rate of a kick."""
         size = RobotSize.of(model.robot)
-        angular, reason = CONTACT * size.inertia, f"A kick turns the base by at most {CONTACT:g} rad/s"
-        momentum = PhysicalBound("N s", angular / size.radius, f"{reason}, at the base's radius.")
+        angular, reason = CONTACT * size.inertia, f"A kick changes the rate of the base by at most {CONTACT:g} rad/s"
+        momentum = PhysicalBound("N s", angular / size.radius, f"{reason}, acting at the base's radius.")
         whole = PhysicalBound("N m s", angular, f"{reason}, and its inertia is {three_digits(size.inertia)} kg m2.")
         return (momentum, whole) if len(self.amplitude) > 3 else (whole,)
 
@@ -82,6 +82,6 @@ class Kicks(Events):
         return -received, jnp.cross(instant.rate, received)
 
     def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
-        """Return the change of what was received in base axes, with its lever kept."""
+        """Return the change of what was received in base axes, with a constant lever."""
         linear, received = self._received(values, instant, inner)
         return jnp.cross(instant.body.com_rate, linear) - jnp.cross(instant.rate, received)

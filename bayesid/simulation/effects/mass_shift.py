@@ -35,17 +35,17 @@ class MassShift(Effect):
 
     A mass m that moves from a to b changes the first moment by ``m (b - a)`` and the second by ``m (b b' - a a')``;
     the base's mass stays the same. The angular momentum about the common centre of mass and the attitude are the same
-    before and after; the base's rate jumps. After the instant the base keeps the changed moments until the recording
-    ends, and the next recording begins without them unless its own instant is negative.
+    before and after; the base's rate jumps. After the instant the moments remain changed until the recording ends, and
+    the next recording begins without the change unless its instant is negative.
 
-    The instant is a constant of the effect and no parameter, since nothing depends on it smoothly; in it the effect is
-    not linear, in the nine moments it is. `table_at` gives its columns at any instant.
+    The instant is a constant of the effect and not a parameter, since nothing depends on it smoothly; the effect is
+    linear in the nine moments, but not in the instant. `table_at` gives its columns at any instant.
 
-    What is left out is the motion itself: a mass that does not move along a line through the common centre of mass
+    The motion itself is omitted: a mass that does not move along a line through the common centre of mass
     turns the base while it moves, by about ``m a x (b - a)`` divided by the inertia, where a and b are taken from that
     centre. This angle does not depend on how fast the mass moves. On a base that turns it changes the rates afterwards
     by as much as the moments do, and a pulse of torque at the same instant stands for it where the rate alone is
-    measured. An accelerometer's shock at the instant is left out, too.
+    measured. The shock on an accelerometer at the instant is also omitted.
 
     Parameters
     ----------
@@ -59,12 +59,12 @@ class MassShift(Effect):
 
     name = "mass-shift"
     summary = (
-        "Something moves over inside the base at one instant, such as a part that comes loose: from then on the base's "
-        "centre of mass and inertia are others."
+        "A mass inside the base shifts at one instant, such as a part that comes loose: the base's centre of mass and "
+        "inertia change at that instant."
     )
     separated_by = (
-        "It acts from one instant on: before it the model fits, and no constant body fits both parts. Repeat the "
-        "manoeuvre; what has come loose stays where it is or moves again."
+        "It acts from one instant: the model fits the data before it, and no constant body fits both parts. Repeat the "
+        "manoeuvre: a loose part remains in its new place or moves again."
     )
     cause_kind = "mass-shift"
     constant_names = ("instants",)
@@ -106,7 +106,7 @@ class MassShift(Effect):
             return self
         if index >= len(self.instants):
             raise InputError(
-                f"effect {self.label!r} has {len(self.instants)} instants and there are more recordings",
+                f"effect {self.label!r} has {len(self.instants)} instants, but there are more recordings",
                 remedy="Give one instant for each recording, or one for all; inf where it does not happen",
             )
         return self.at(self.instants[index : index + 1])
@@ -120,7 +120,7 @@ class MassShift(Effect):
         """Return the moments of the largest part that moves from one side of the base to the other."""
         size = RobotSize.of(model.robot)
         mass = LOOSE * size.base_mass
-        part = f"At most {100.0 * LOOSE:g} % of the base, {three_digits(mass)} kg, moves over inside it at once"
+        part = f"At most {100.0 * LOOSE:g} % of the base, {three_digits(mass)} kg, shifts inside it at one instant"
         return (
             PhysicalBound("kg m", 2.0 * mass * size.radius, f"{part}, by at most {three_digits(2.0 * size.radius)} m."),
             PhysicalBound(
@@ -159,7 +159,7 @@ class MassShift(Effect):
         """Return the instant in a recording that ends at a time [s]."""
         if len(self.instants) > 1:
             raise InputError(
-                f"effect {self.label!r} has an instant of its own in each recording and none is named",
+                f"effect {self.label!r} has a separate instant in each recording, and no recording is named",
                 remedy="Choose one with `in_recording`, or give one instant for all",
             )
         return self.instants[0] if self.instants else 0.5 * end
@@ -174,7 +174,7 @@ def _seconds(instants: str | Sequence[float]) -> tuple[float, ...]:
         seconds = (float("nan"),)
     if any(np.isnan(instant) for instant in seconds):
         raise InputError(
-            f"mass-shift: {instants!r} is no list of instants",
+            f"mass-shift: {instants!r} is not a list of instants",
             remedy="Give seconds since the start of each recording, such as mass-shift:12.5,inf",
         )
     return seconds

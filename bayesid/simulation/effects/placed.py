@@ -18,7 +18,8 @@ class Placed(Effect):
     def __init__(self, place: str = "") -> None:
         if not place:
             raise InputError(
-                f"effect {self.name!r} does not say where", remedy=f"Write {self.name}:NAME, with a name of the URDF"
+                f"effect {self.name!r} does not state its place",
+                remedy=f"Write {self.name}:NAME, with a name of the URDF",
             )
         self.place = place
 

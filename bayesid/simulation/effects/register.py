@@ -50,5 +50,5 @@ def create(label: str, **options: Any) -> Effect:
     except Exception as error:
         raise InputError(
             f"effect {label!r} cannot be made: {type(error).__name__}: {error}",
-            remedy="Give the place that it needs, as NAME:PLACE, or correct the effect",
+            remedy="Give the required place as NAME:PLACE, or correct the effect",
         ) from error

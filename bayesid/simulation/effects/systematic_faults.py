@@ -38,7 +38,7 @@ __all__ = [
     "SystematicFault",
 ]
 
-MISMOUNTED = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
+MISMOUNTED = 0.1, "A sensor mounted without alignment measurement is misaligned by less than six degrees."
 """Largest rotation of a sensor against its stated mounting [rad], and the reason."""
 
 WARM_UP = 600.0
@@ -158,10 +158,10 @@ class SensorBias(_FaultByAxis):
     """Constant error of a sensor; the default prior is that of `Instrument`."""
 
     name = "SENSOR-bias"
-    summary = "The {instrument} reads a constant {idle}."
+    summary = "The {instrument} reads a constant value {idle}."
     separated_by = (
-        "It is present at rest and does not depend on motion: record a longer rest before and after the motion, and "
-        "run the motion the other way; the readings due to the motion change their sign, a bias does not."
+        "It is present at rest and does not depend on motion: record longer rest periods before and after the motion, "
+        "and run the motion in reverse; readings caused by the motion change their sign, a bias does not."
     )
 
     @classmethod
@@ -179,7 +179,7 @@ class SensorBias(_FaultByAxis):
         poorest = self.sensor.instrument.poorest
         if poorest is None:
             return super().physical_bounds(model)
-        return (PhysicalBound(self.unit(), poorest.error, f"{poorest.instruments} are wrong by {poorest.words}."),)
+        return (PhysicalBound(self.unit(), poorest.error, f"{poorest.instruments} have an error of {poorest.words}."),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         """Return the readings with a constant added."""
@@ -191,10 +191,10 @@ class SensorDrift(_FaultByAxis):
     """Error of a sensor that grows with time; with the default prior it gains about the prior bias in a minute."""
 
     name = "SENSOR-drift"
-    summary = "The {instrument}'s zero wanders steadily, as when it warms up."
+    summary = "The {instrument}'s zero drifts steadily, for example during warm-up."
     separated_by = (
-        "It grows with time and does not depend on motion: record a longer rest before and after the motion, and "
-        "repeat the motion the other way."
+        "It grows with time and does not depend on motion: record longer rest periods before and after the motion, and "
+        "repeat the motion in reverse."
     )
 
     @classmethod
@@ -214,7 +214,7 @@ class SensorDrift(_FaultByAxis):
         poorest = self.sensor.instrument.poorest
         if poorest is None:
             return super().physical_bounds(model)
-        reason = f"{poorest.instruments} gain {poorest.words} within ten minutes of warming up."
+        reason = f"{poorest.instruments} drift by {poorest.words} within ten minutes of warm-up."
         return (PhysicalBound(self.unit(), poorest.error / WARM_UP, reason),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -227,14 +227,14 @@ class SensorScale(_FaultByAxis):
     """Error of a sensor's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
 
     name = "SENSOR-scale"
-    summary = "The {instrument} reads too much or too little in proportion to {measures}."
+    summary = "The {instrument} reads too high or too low in proportion to {measures}."
     separated_by = (
-        "It grows with the reading: move the other way and faster, with larger readings about each axis in turn."
+        "It grows with the reading: move in reverse and faster, with larger readings about each axis in turn."
     )
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the error of a scale that nobody calibrated."""
-        reason = "The scale of a sensor without calibration is within a tenth of its nominal value."
+        """Return the error of an uncalibrated scale."""
+        reason = "The scale of an uncalibrated sensor is within 10 % of its nominal value."
         return (PhysicalBound("1", 0.1, reason),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -247,8 +247,8 @@ class SensorMisalignment(_FaultByAxis):
     """Rotation of a sensor of a vector against its stated mounting; the prior is two degrees per axis."""
 
     name = "SENSOR-misalignment"
-    summary = "The {instrument} is turned against its stated mounting."
-    separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
+    summary = "The {instrument} is rotated relative to its stated mounting."
+    separated_by = "It couples the axes: rotate about one axis at a time, with large readings."
 
     @classmethod
     def occurs_in(cls, kind: SensorKind) -> bool:
@@ -261,7 +261,7 @@ class SensorMisalignment(_FaultByAxis):
         return "rad"
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the rotation of a sensor that nobody measured."""
+        """Return the rotation of a sensor whose alignment was not measured."""
         return (PhysicalBound("rad", *MISMOUNTED),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -273,13 +273,14 @@ class SensorMisalignment(_FaultByAxis):
 class AccelPosition(SystematicFault):
     """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
 
-    The gravity gradient over the error is left out, since it is below 2e-7 m/s2 for 5 cm in any orbit.
+    The gravity gradient over the error is omitted, since it is below 2e-7 m/s2 for 5 cm in any orbit.
     """
 
     name = "accel-position"
-    summary = "The accelerometer is mounted elsewhere than stated and reads another part of the base's rotation."
+    summary = "The accelerometer is not at its stated position and measures a different acceleration."
     separated_by = (
-        "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
+        "It grows with the base's rate squared and angular acceleration: rotate the base faster about each axis in "
+        "turn."
     )
     sensor = SensorKind.ACCEL
 
@@ -287,9 +288,9 @@ class AccelPosition(SystematicFault):
         self.parameters = tuple(Parameter(axis, "m", sigma) for axis in "xyz")
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the radius of the base, somewhere within which the accelerometer is."""
+        """Return the radius of the base, within which the accelerometer is located."""
         radius = RobotSize.of(model.robot).radius
-        reason = f"An accelerometer of the base is somewhere within its radius of {three_digits(radius)} m."
+        reason = f"An accelerometer on the base is within its radius of {three_digits(radius)} m."
         return (PhysicalBound("m", radius, reason),)
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
@@ -307,17 +308,17 @@ class AttitudeMisalignment(SystematicFault):
     sense of the sensor's noise and residual: ``measured = true * rotation(x, y, z)`` for attitudes from base to orbit
     axes.
 
-    The reading at the first sample shows it where the recording's initial attitude is exact. Where that attitude is
-    unknown, its error takes up the rotation at that instant. What is left then shows while the base turns about another
-    axis, by the angle of turn times the misalignment, and where the recorded rate, or the direction of the Earth in a
-    gravity gradient, tells the true axes. The same error in all recordings, with initial attitudes of their own, is a
-    misalignment more than it is any of those.
+    The reading at the first sample determines it if the recording's initial attitude is exact. If that attitude is
+    unknown, its error absorbs the rotation at that instant. The remainder appears while the base rotates about another
+    axis, as the angle of rotation times the misalignment, and where the recorded rate, or the direction of the Earth in
+    a gravity gradient, determines the true axes. The same error in all recordings, with separate initial attitudes, is
+    more probably a misalignment than any of those.
     """
 
     name = "attitude-misalignment"
-    summary = "The star sensor is turned against its stated mounting: every measured attitude has the same error."
+    summary = "The star tracker is rotated from its stated mounting: every measured attitude has the same error."
     separated_by = (
-        "It is the same rotation in base axes in every attitude: turn the base by large angles about each axis in turn."
+        "It is the same rotation in base axes at every attitude: rotate the base by large angles about each axis."
     )
     sensor = SensorKind.ATTITUDE
 
@@ -325,7 +326,7 @@ class AttitudeMisalignment(SystematicFault):
         self.parameters = tuple(Parameter(axis, "rad", sigma) for axis in "xyz")
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the rotation of a sensor that nobody measured."""
+        """Return the rotation of a sensor whose alignment was not measured."""
         return (PhysicalBound("rad", *MISMOUNTED),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -338,10 +339,10 @@ class SensorLatency(_FaultOfAnyKind):
     """Delay of a sensor; the prior is a few cycles of a slow data bus."""
 
     name = "SENSOR-latency"
-    summary = "The {instrument}'s samples are stamped late: each shows the past."
+    summary = "The {instrument}'s samples are stamped late: each contains an earlier reading."
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
-        "those of a delay grow with frequency."
+        "It grows with speed: repeat the same motion twice as fast; the effects of body errors remain proportional to "
+        "the motion, whereas those of a delay grow with frequency."
     )
 
     def __init__(self, sigma: float = 0.2) -> None:
@@ -349,7 +350,7 @@ class SensorLatency(_FaultOfAnyKind):
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return a cycle of slow telemetry."""
-        return (PhysicalBound("s", 1.0, "A slow telemetry stamps its samples once in a second."),)
+        return (PhysicalBound("s", 1.0, "Slow telemetry stamps its samples once per second."),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         """Return the true readings of earlier times."""
@@ -364,10 +365,10 @@ class SensorClock(_FaultOfAnyKind):
     """
 
     name = "SENSOR-clock"
-    summary = "The {instrument}'s clock runs fast or slow: its samples drift away from the motion of the arm."
+    summary = "The {instrument}'s clock runs fast or slow: its samples drift relative to the motion of the arm."
     separated_by = (
-        "It is a delay that grows with time: repeat the same motion early and late in one recording; a delay that "
-        "stays the same is no fault of the clock's rate."
+        "It is a delay that grows with time: repeat the same motion early and late in one recording; a constant "
+        "delay is not a clock error."
     )
 
     def __init__(self, sigma: float = 1.0e-3) -> None:
@@ -376,8 +377,8 @@ class SensorClock(_FaultOfAnyKind):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the error of a nominal sampling rate that is rounded."""
         reason = (
-            "A crystal keeps time to 1e-4; time stamps that are counted with a rounded sampling rate, such as 100 in "
-            "place of 101 samples per second, are wrong by 1 %."
+            "A crystal clock is accurate to 1e-4; time stamps computed from a rounded sampling rate, such as 100 "
+            "instead of 101 samples per second, are wrong by 1 %."
         )
         return (PhysicalBound("1", 1.0e-2, reason),)
 

@@ -23,11 +23,11 @@ than the base and moves by centimetres."""
 class ThermalSnap(Events):
     """Angular momentum that a panel takes from the base at an instant, relative to it, base axes.
 
-    Either it has it at once and gives it back with the time of the decay, as a panel does that bends as fast as its
+    Either the panel takes the momentum at once and returns it with the decay time, if it bends as fast as its
     temperature changes (J. D. Johnston and E. A. Thornton, Thermally induced dynamics of satellite solar panels,
-    Journal of Spacecraft and Rockets 37, 2000), so that the base has turned and rests again. Or it takes it up with
-    that time and keeps it, which to the base is a torque that appears at once and dies away. An event's shape is the
-    decay [s], and 1 where the momentum is kept, else 0.
+    Journal of Spacecraft and Rockets 37, 2000), so that the base has turned and is at rest again. Or it takes the
+    momentum with that time constant and retains it, which acts on the base as a torque that appears at once and
+    decays. An event's shape is the decay time [s], and 1 if the momentum is retained, else 0.
 
     Parameters
     ----------
@@ -36,10 +36,12 @@ class ThermalSnap(Events):
     """
 
     name = "thermal-snap"
-    summary = "A panel or a boom snaps, as on entering light or shadow: it takes momentum from the base and settles."
+    summary = (
+        "A panel or boom snaps, for example at sunrise or sunset: it exchanges momentum with the base and settles."
+    )
     separated_by = (
-        "It comes at the terminator and not with the motion: record at rest across sunrise and sunset, and repeat the "
-        "motion at another place of the orbit."
+        "It occurs at sunrise or sunset and does not depend on motion: record at rest across both, and repeat the "
+        "motion at a different point of the orbit."
     )
     amplitude = tuple((f"angular_momentum.{axis}", "N m s", 0.1) for axis in "xyz")
     trial_shapes = tuple((decay, kept) for kept in (0.0, 1.0) for decay in (2.0, 4.0, 8.0, 16.0))
@@ -47,7 +49,7 @@ class ThermalSnap(Events):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return what gives the base the largest rate of a snap."""
         inertia = RobotSize.of(model.robot).inertia
-        reason = f"A snap turns a base of {three_digits(inertia)} kg m2 by at most {SNAP:g} rad/s."
+        reason = f"A snap changes the rate of a base of {three_digits(inertia)} kg m2 by at most {SNAP:g} rad/s."
         return (PhysicalBound("N m s", SNAP * inertia, reason),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:

@@ -27,7 +27,7 @@ class PulseTrain(NamedTuple):
     Attributes
     ----------
     period, width : float
-        From the beginning of a pulse to that of the next, and to its own end [s].
+        From the beginning of a pulse to that of the next, and to its end [s].
     alternating : bool
         Whether every other pulse has the opposite sign, as in a limit cycle.
     first : tuple of float
@@ -60,10 +60,10 @@ class ThrusterPulses(Effect):
     """
 
     name = "thruster-pulses"
-    summary = "A thruster fires in pulses at regular intervals, one way or with alternating sign as in a limit cycle."
+    summary = "A thruster fires in pulses at regular intervals, with constant sign or alternating as in a limit cycle."
     separated_by = (
-        "The rates climb in steps and not steadily as with a leak: sample faster than the pulses are long, record with "
-        "the arm at rest, and longer; the steps come by the clock and not with the motion."
+        "The rates rise in steps, not steadily as with a leak: sample faster than the pulse length, and record longer "
+        "with the arm at rest; the steps follow the clock and not the motion."
     )
     cause_kind = "pulses"
     constant_names = ("period", "width", "alternating", "first")
@@ -76,7 +76,7 @@ class ThrusterPulses(Effect):
             period, width, sign, first = -1.0, 0.0, 0.0, []
         if not 0.0 < width < period or not first or sign not in (0.0, 1.0):
             raise InputError(
-                f"{self.name}: {place!r} is no train of pulses",
+                f"{self.name}: {place!r} is not a train of pulses",
                 remedy=f"Give period, width, 0 or 1, and the first pulses: {self.name}:20,0.5,0,7 or with inf for none",
             )
         self.stated = bool(place)
@@ -155,7 +155,7 @@ class ThrusterPulses(Effect):
         return -received, jnp.cross(instant.rate, received) - self._on(instant.environment)[0] * torque
 
     def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
-        """Return the change of what was received in base axes, with the levers of the pulses kept."""
+        """Return the change of what was received in base axes, with constant levers of the pulses."""
         _, received = self._received(values, instant, inner)
         lever = self._on(instant.environment)[1] * jnp.cross(instant.body.com_rate, values[:3])
         return lever - jnp.cross(instant.rate, received)

@@ -85,9 +85,10 @@ class WheelInertia(OnWheel):
     """Factor on a wheel's inertia times its recorded speed: a wrong inertia, unit, gear or number of poles."""
 
     name = "wheel-inertia"
-    summary = "The wheel has more or less momentum than its declared inertia and recorded speed say."
+    summary = "The wheel's momentum differs from the product of its declared inertia and recorded speed."
     separated_by = (
-        "It grows with the wheel's acceleration: run this wheel up and down alone, with the others at constant speed."
+        "It grows with the wheel's acceleration: accelerate and decelerate this wheel with the others at constant "
+        "speed."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.3) -> None:
@@ -109,7 +110,7 @@ class WheelInertia(OnWheel):
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the error of a speed with the wrong sign."""
-        return (PhysicalBound("1", LARGEST_FACTOR, "A speed with the wrong sign is wrong by twice itself."),)
+        return (PhysicalBound("1", LARGEST_FACTOR, "A speed with the wrong sign has an error of twice its value."),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return what the recorded momentum lacks, and its derivative."""
@@ -142,14 +143,12 @@ class WheelTilt(OnWheel):
     """Small tilt of a wheel's axis, by two angles towards two directions across it.
 
     The first direction is the cross product of the axis with the base axis that is farthest from it, the second that of
-    the axis with the first. The true axis in base axes is reported beside the angles.
+    the axis with the first. The true axis in base axes is reported with the angles.
     """
 
     name = "wheel-tilt"
-    summary = "The wheel's axis points a little elsewhere: its momentum turns the base about other axes as well."
-    separated_by = (
-        "It turns the base across the wheel's axis when that wheel runs up: run it up alone, the others at rest."
-    )
+    summary = "The wheel's axis is slightly misaligned: its momentum also rotates the base about other axes."
+    separated_by = "It rotates the base normal to the wheel's axis: accelerate that wheel with the others at rest."
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
         super().__init__(place)
@@ -171,8 +170,8 @@ class WheelTilt(OnWheel):
         return jnp.concatenate([values, axis / jnp.linalg.norm(axis)])
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return a tilt that the eye would see."""
-        reason = f"A wheel that is tilted by more than {LARGEST_TILT:g} rad, six degrees, is seen with the eye."
+        """Return a tilt that is visible to the eye."""
+        reason = f"A wheel tilt of more than {LARGEST_TILT:g} rad, six degrees, is visible to the eye."
         return (PhysicalBound("rad", LARGEST_TILT, reason),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
@@ -187,8 +186,8 @@ class WheelLatency(OnWheel):
     """Delay of a wheel's recorded speed: the speed stamped t is that of t - delay; to second order in the delay."""
 
     name = "wheel-latency"
-    summary = "The recorded speed of the wheel is late: the wheel runs already as it is recorded only later."
-    separated_by = "It grows with the wheel's acceleration: run the wheel up twice as fast."
+    summary = "The recorded speed of the wheel is late: the wheel reaches each speed before it is recorded."
+    separated_by = "It grows with the wheel's acceleration: accelerate the wheel twice as fast."
 
     def __init__(self, place: str = "", sigma: float = 0.2) -> None:
         super().__init__(place)
@@ -196,7 +195,7 @@ class WheelLatency(OnWheel):
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return a cycle of slow telemetry."""
-        return (PhysicalBound("s", LARGEST_DELAY, "A slow telemetry stamps its samples once in a second."),)
+        return (PhysicalBound("s", LARGEST_DELAY, "Slow telemetry stamps its samples once per second."),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return by how much the true momentum is ahead of the recorded one, and its derivative."""
@@ -211,10 +210,10 @@ class WheelImbalance(OnWheel):
 
     The static imbalance is a first moment of mass off the axis: its force acts at the wheel's place, and turns the base
     about the common centre of mass. The dynamic one is the momentum across the axis per speed. The line has order one
-    unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed that the order
-    says. Seen by the sensors the line is as sharp as the smoothed speed, and what the base's rotation changes of it is
-    left out. Where the wheel turns faster than half the rate of the samples it is no candidate: averages over blocks
-    show no such line, and ``blocks_per_second = 0`` keeps all samples.
+    unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed given by the
+    order. In the readings the line is as sharp as the smoothed speed, and the influence of the base's rotation on it is
+    neglected. Where the wheel turns faster than half the rate of the samples it is no candidate: averages over blocks
+    contain no such line, and ``blocks_per_second = 0`` uses all samples.
 
     Parameters
     ----------
@@ -227,10 +226,10 @@ class WheelImbalance(OnWheel):
     """
 
     name = "wheel-imbalance"
-    summary = "The wheel is out of balance and shakes the base once in a turn."
+    summary = "The wheel is unbalanced and shakes the base once per revolution."
     separated_by = (
-        "It shakes at the wheel's own speed, with a force that grows as its square: run this wheel up slowly, with the "
-        "others at another speed."
+        "It shakes at the wheel's speed, with a force that grows with its square: accelerate this wheel slowly, with "
+        "the others at a different speed."
     )
     per_recording: ClassVar[bool] = True
     cause_kind: ClassVar[str] = "order-line"
@@ -244,7 +243,7 @@ class WheelImbalance(OnWheel):
         try:
             self.order = float(stated) if stated else order
         except ValueError:
-            raise InputError(f"{self.label}: {stated!r} is no order", remedy="Write WHEEL,ORDER") from None
+            raise InputError(f"{self.label}: {stated!r} is not an order", remedy="Write WHEEL,ORDER") from None
         self._stated = static, dynamic
         self._set(1.0, 1.0)
 
@@ -299,10 +298,12 @@ class WheelImbalance(OnWheel):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the imbalance of a rotor that is off its axis by a hundredth of its radius."""
         wheel = model.robot.wheels[self.index]
-        off = f"A rotor of {three_digits(wheel.inertia)} kg m2 lies within {100.0 * ECCENTRICITY:g} % of its"
+        off = (
+            f"Imbalance of a rotor of {three_digits(wheel.inertia)} kg m2 is at most {100.0 * ECCENTRICITY:g} % of its"
+        )
         return (
-            PhysicalBound("kg m", _largest_static(model.robot, wheel), f"{off} radius about its axis."),
-            PhysicalBound("kg m2", ECCENTRICITY * wheel.inertia, f"{off} inertia along its axis."),
+            PhysicalBound("kg m", _largest_static(model.robot, wheel), f"{off} mass times its radius."),
+            PhysicalBound("kg m2", ECCENTRICITY * wheel.inertia, f"{off} inertia about its axis."),
         )
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:

@@ -31,8 +31,8 @@ AXES = "xyz"
 class WheelHistory(Placed):
     """Momentum of reaction wheels along one base axis as a piecewise linear function of time, in each recording.
 
-    The momentum has values of its own in every recording, at 24 knots from its start to ``end``, by default ten
-    seconds apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
+    The momentum has separate values in every recording, at 24 knots from its start to ``end``, by default ten seconds
+    apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
     prior. While it changes, the wheel drives the base by the negative of its slope, which jumps at the knots. A
     momentum that is constant in all recordings is `WheelMomentum`.
 
@@ -42,7 +42,7 @@ class WheelHistory(Placed):
     Parameters
     ----------
     place : str
-        Base axis, x, y or z, and after a comma the time of the last knot, if another than the default.
+        Base axis, x, y or z, and after a comma the time of the last knot if it differs from the default.
     end : float
         Time of the last knot [s], best the length of the longest recording.
     sigma : float
@@ -51,12 +51,12 @@ class WheelHistory(Placed):
 
     name = "wheel-history"
     summary = (
-        "A reaction wheel about the axis runs up or down without being recorded: it drives the base against itself and "
-        "makes it a gyroscope."
+        "A reaction wheel about the axis changes its speed without being recorded: it exerts a reaction torque on the "
+        "base and makes it a gyroscope."
     )
     separated_by = (
-        "What it takes from the base it gives back when it stops, and it acts with the arm at rest: record a longer "
-        "rest before and after the motion, and repeat the same motion, which the wheel need not follow."
+        "It returns its momentum to the base when it stops, and it acts with the arm at rest: record longer rest "
+        "periods before and after the motion, and repeat the motion, which the wheel need not follow."
     )
     per_recording: ClassVar[bool] = True
     constant_names = ("end",)
@@ -66,7 +66,9 @@ class WheelHistory(Placed):
         super().__init__(axis)
         self.end = float(stated) if stated else end
         if not 0.0 < self.end < np.inf:
-            raise InputError(f"{self.label}: the last knot is at {self.end:g} s", remedy="Give the recordings' length")
+            raise InputError(
+                f"{self.label}: the last knot is at {self.end:g} s", remedy="Give the length of the recordings"
+            )
         self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
 
     @classmethod
@@ -89,7 +91,7 @@ class WheelHistory(Placed):
         """Return the effect after a check of its axis."""
         if self.place not in tuple(AXES):
             raise InputError(
-                f"effect {self.label!r}: {self.place!r} is no axis of the base", remedy=f"Axes: {', '.join(AXES)}"
+                f"effect {self.label!r}: {self.place!r} is not an axis of the base", remedy=f"Axes: {', '.join(AXES)}"
             )
         return self
 
