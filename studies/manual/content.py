@@ -1,4 +1,4 @@
-"""What the code says of itself: commands, keys of the study file, effects, criteria, rooms and public names.
+"""Reference read from the code: commands, keys of the study file, effects, criteria, packages and public names.
 
 Text is given as pieces, of which every other one is code: Typst sets those apart.
 """
@@ -27,7 +27,7 @@ from studies.manual import interface
 
 Pieces = list[str]  # a text in pieces: plain, code, plain, and so on
 
-# description of the package, which states its version and the order of its rooms
+# description of the package, which states its version and the order of its packages
 PROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
 
 VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}  # words for the value of an option that names none
@@ -43,7 +43,7 @@ def content() -> dict[str, Any]:
         "sections": list(_sections()),
         "effects": [_effect(entry) for entry in catalogue()],
         "criteria": [{"name": kind.name, "paragraphs": _paragraphs(kind)} for kind in known_criteria().values()],
-        "rooms": list(_packages(project["tool"]["importlinter"]["contracts"][0]["layers"])),
+        "packages": list(_packages(project["tool"]["importlinter"]["contracts"][0]["layers"])),
         "names": [{"name": name, "text": _first(getattr(bayesid, name))} for name in sorted(bayesid.__all__)],
         "hooks": [
             {"name": name, "text": _first(value)}
