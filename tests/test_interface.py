@@ -131,7 +131,7 @@ def test_the_session_of_the_readme_runs(study, tmp_path, monkeypatch, capsys):
     session: dict[str, object] = {}
     exec(code, session)
     assert capsys.readouterr().out.startswith("Verdict: ")
-    assert session["base"] is session["found"].identification.bodies["base_link"]
+    assert session["base"] is session["diagnosis"].identification.bodies["base_link"]
     assert "sample_stats" in session["tree"].children
     assert Robot.from_urdf("identified.urdf").base == "base_link"
     assert Path("verdict.png").stat().st_size > 10_000

@@ -49,6 +49,7 @@ class PulsesCause(ShapedCause):
     """Trains of pulses: a period, a width and whether signs alternate, the same in all recordings, and first pulses."""
 
     name = "pulses"
+    alone_as_well = True  # a leak with pulses of either sign equals pulses of one sign
 
     def trials(self, effect: Effect, ends: Floats) -> list[tuple[Effect, bool]]:
         """Return a few trains that begin alike in all recordings."""

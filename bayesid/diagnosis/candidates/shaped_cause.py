@@ -90,6 +90,9 @@ class ShapedCause(CauseKind):
 
     linearised_beside: ClassVar[bool] = True
 
+    alone_as_well: ClassVar[bool] = False
+    """Whether the best shape beside nothing is tuned in addition to the most probable one in other company."""
+
     def trials(self, effect: Effect, ends: Floats) -> list[tuple[Effect, bool]]:
         """Return the forms of the bank, and of each whether it stands for one in each recording by itself.
 
@@ -164,7 +167,7 @@ class ShapedCause(CauseKind):
             names = [manoeuvre.recording.name for manoeuvre in point.fit.posterior.manoeuvres]
             forms: list[tuple[AmplitudeGroup, ...]] = []
             log_shares = []
-            for total, causes, proposal in _best_by_company(tuned):
+            for total, causes, proposal in self._best_by_company(tuned):
                 if total < likeliest - max(WORTH, LOST * proposal.gain):
                     continue
                 tuning = self._tuned(point, proposal, causes, likeliest - total + proposal.gain)
@@ -189,6 +192,16 @@ class ShapedCause(CauseKind):
             others = tuple(more if one is cause else one for one in bank.causes)
             bank = SignatureBank(bank.signatures, others)
         return point if bank is point.bank else point.with_bank(bank)
+
+    def _best_by_company(
+        self, tuned: Sequence[tuple[float, tuple[str, ...], ShapeProposal]]
+    ) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
+        """Return the most probable proposal, and if wanted that beside nothing."""
+        best = max(tuned, key=lambda trial: trial[0])
+        alone = [trial for trial in tuned if not trial[1]]
+        if not self.alone_as_well or not best[1] or not alone:
+            return [best]
+        return [best, max(alone, key=lambda trial: trial[0])]
 
     def with_names(self, effect: Effect, names: Sequence[str]) -> Effect:
         """Return an effect whose amplitudes have the names of their recordings."""
@@ -289,18 +302,6 @@ class ShapedCause(CauseKind):
             sd = float(np.sqrt(weight @ (steps - mean) ** 2 + (wide / POINTS) ** 2 / 12.0))
             numbers_of_shape.append(CauseAmplitude(quantity, float(numbers[place]) + mean, sd))
         return numbers_of_shape
-
-
-def _best_by_company(
-    tuned: Sequence[tuple[float, tuple[str, ...], ShapeProposal]],
-) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
-    """Return the most probable proposal, and that beside nothing.
-
-    Pulses of either sign beside a leak make those of one sign alone, so that the cause by itself is tuned as well.
-    """
-    best = max(tuned, key=lambda trial: trial[0])
-    alone = [trial for trial in tuned if not trial[1]]
-    return [best] if not best[1] or not alone else [best, max(alone, key=lambda trial: trial[0])]
 
 
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
