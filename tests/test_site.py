@@ -1,0 +1,96 @@
+"""The manual as a web site: in a headless browser every page opens, every link leads somewhere, and search finds."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+NEEDED = ("mkdocs", "material", "bs4", "PyQt6.QtWebEngineCore")
+
+
+def is_there(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not all(map(is_there, NEEDED)) and not os.environ.get("CI"),
+        reason='the site needs the extra docs: pip install -e ".[docs]"',
+    ),
+]
+
+
+class Anchors(HTMLParser):
+    """Links and anchors of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.names: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if tag == "a" and values.get("href"):
+            self.links.append(str(values["href"]))
+        if values.get("id"):
+            self.names.add(str(values["id"]))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("manual")
+    command = [sys.executable, "-m", "studies.manual", "--output", folder / "manual.pdf", "--site", folder / "site"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def seen(site):
+    script = Path(__file__).with_name("headless_browser.py")
+    command = [sys.executable, str(script), str(site), "wheel-momentum"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_every_page_opens(seen):
+    assert len(seen["pages"]) >= 12
+    for name, page in seen["pages"].items():
+        assert page["opened"], name
+        assert page["title"], name
+        assert page["height"] > 100, name
+    assert sum(page["formulas"] for page in seen["pages"].values()) > 40
+    assert seen["errors"] == []
+
+
+def test_search_finds_a_cause(seen):
+    assert any(hit.startswith("effects.html#") for hit in seen["hits"])
+
+
+def test_every_link_leads_somewhere(site):
+    pages = {file.name: Anchors(file.read_text(encoding="utf-8")) for file in site.glob("*.html")}
+    links = [(name, link) for name, page in pages.items() for link in page.links if "://" not in link]
+    assert len(links) > 100
+    broken = []
+    for name, link in links:
+        target, _, anchor = link.partition("#")
+        target = target.removeprefix("/") or name
+        if target in (".", "./"):
+            target = "index.html"
+        if target not in pages or (anchor and anchor not in pages[target].names):
+            broken.append((name, link))
+    assert broken == []
