@@ -8,8 +8,10 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
+from scipy.spatial.transform import Rotation
 
 import bayesid
 from bayesid.app.command_line import app
@@ -20,7 +22,9 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.recording_check import ChannelSampling, JointCheck, RecordingCheck, SensorCheck
 from bayesid.report.effect_catalogue import catalogue
 from bayesid.simulation.effects.register import known_effects
+from bayesid.simulation.orbit import Orbit
 from studies import manual
+from studies.manual.sources import PROSE
 from tests.pdf_text import PdfText
 from tests.report_rules import badly_written
 
@@ -67,7 +71,7 @@ def test_names_can_be_copied_out_of_the_manual(text):
 
 def results() -> set[str]:
     """Words set as code in the chapter on results, and the keys in the first column of its tables."""
-    chapter = manual.PROSE.read_text(encoding="utf-8").partition("\n= Results\n")[2].partition("\n= ")[0]
+    chapter = PROSE.read_text(encoding="utf-8").partition("\n= Results\n")[2].partition("\n= ")[0]
     code = re.findall(r"`([^`]+)`", chapter)
     columns = [word for cell in re.findall(r'^  "([\w ]+)", \[', chapter, flags=re.MULTILINE) for word in cell.split()]
     return {*code, *columns, "mean", "sd", "unit"}
@@ -123,10 +127,38 @@ def test_the_manual_explains_messages_that_the_program_has():
     assert [part for message in messages for part in message.split(" … ") if part not in code] == []
 
 
+@pytest.mark.parametrize("argument_of_latitude", [-2.8, 0.0, 0.7, 3.0])
+def test_an_ephemeris_is_converted_as_the_orbit_has_it(argument_of_latitude):
+    chapter = (ROOT / "studies" / "manual" / "tasks.typ").read_text(encoding="utf-8")
+    names = {}
+    exec(chapter.partition("```python\n")[2].partition("```")[0], names)
+    draw = np.random.default_rng(3)
+    inertial_of_node = Rotation.from_euler("ZX", [1.1, 0.9])  # right ascension of the node, then inclination
+    cos, sin = np.cos(argument_of_latitude), np.sin(argument_of_latitude)
+    position = 7e6 * inertial_of_node.apply([cos, sin, 0.0])
+    velocity = 7.5e3 * inertial_of_node.apply([-sin, cos, 0.0])
+    base, sun = Rotation.random(rng=draw), draw.standard_normal(3)
+    sun /= np.linalg.norm(sun)
+    values = names["study_values"](position, velocity, base.as_quat(), sun)
+    orbit = Orbit(radius=7e6, inclination=float(values["inclination"]), sun=tuple(values["sun"].tolist()))
+    state = orbit.state([0.0], float(values["argument_of_latitude"]))
+    assert values["argument_of_latitude"] == pytest.approx(argument_of_latitude)
+    assert values["inclination"] == pytest.approx(0.9)
+    # what is fixed in space is seen from the base in the same direction, by the study and by the inertial attitude
+    to_base = Rotation.from_quat(values["attitude"]).inv()
+    for orbit_axes, inertial in [
+        (state.sun[0], sun),
+        (state.north[0], [0.0, 0.0, 1.0]),
+        (state.zenith[0], position / 7e6),
+        (state.velocity[0], velocity / 7.5e3),
+    ]:
+        np.testing.assert_allclose(to_base.apply(orbit_axes), base.inv().apply(inertial), atol=1e-12)
+
+
 def test_the_release_notes_have_the_version(text):
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     assert f"Manual of bayesid {version}" in text
-    assert f"\n== {version}\n" in manual.PROSE.read_text(encoding="utf-8").partition("= Release notes")[2]
+    assert f"\n== {version}\n" in PROSE.read_text(encoding="utf-8").partition("= Release notes")[2]
 
 
 PLANNED: set[str] = set()
