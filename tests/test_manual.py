@@ -152,7 +152,7 @@ def test_an_ephemeris_is_converted_as_the_orbit_has_it(argument_of_latitude):
         (state.zenith[0], position / 7e6),
         (state.velocity[0], velocity / 7.5e3),
     ]:
-        np.testing.assert_allclose(to_base.apply(orbit_axes), base.inv().apply(inertial), atol=1e-12)
+        np.testing.assert_allclose(to_base.apply(np.array(orbit_axes)), base.inv().apply(inertial), atol=1e-12)
 
 
 def test_the_release_notes_have_the_version(text):
