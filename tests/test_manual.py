@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import importlib
 import inspect
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -125,6 +126,23 @@ def test_the_manual_explains_messages_that_the_program_has():
     code = re.sub(r'"\s*\n\s*f?"', "", code)  # literals over several lines
     assert len(messages) >= 12
     assert [part for message in messages for part in message.split(" … ") if part not in code] == []
+
+
+@pytest.mark.parametrize("chapter", ["start", "tasks"])
+def test_every_key_of_an_example_exists(chapter):
+    prose = PROSE.with_name(f"{chapter}.typ").read_text(encoding="utf-8")
+    known = json.dumps(editor_schema())
+    for block in re.findall(r"```toml\n(.*?)```", prose, flags=re.DOTALL):
+        assert [key for key in keys_of_table(tomllib.loads(block)) if f'"{key}"' not in known] == []
+
+
+def keys_of_table(table):
+    """Yield the keys of a table of TOML and of those in it, but for names of bodies."""
+    for key, value in table.items():
+        yield key
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, dict) and key != "spread":
+                yield from keys_of_table(one)
 
 
 @pytest.mark.parametrize("argument_of_latitude", [-2.8, 0.0, 0.7, 3.0])
