@@ -137,6 +137,16 @@ def test_smoothed_joints_are_as_sure_at_any_rate_as_their_noise_density_says(rat
     np.testing.assert_allclose(spreads[1][0], spreads[0][0], rtol=0.1)
 
 
+def test_a_short_block_at_the_end_costs_no_digits():
+    time, rng = np.arange(0.0, 140.005, 0.01), np.random.default_rng(6)
+    slow = 0.3 * np.sin(0.2 * time) ** 3 + 7e-6 * rng.normal(size=len(time))
+    joint = smooth([JointSamples(0, time, slow, 7e-6).reduced(10.0)], orders=(5,))
+    assert np.diff(joint.nodes)[-1] < 0.6 * np.diff(joint.nodes)[0]  # blocks of ten samples, the last of a single one
+    parabola = JointSamples(0, time, 1e-3 * (time - 70.0) ** 2, 7e-6).reduced(10.0)
+    exact = replace(joint, series=(parabola,)).with_roughness(np.ones(len(joint.nodes) - 1))
+    assert exact.chi2 < 1e-3  # a motion without any noise of the process
+
+
 def test_means_of_position_and_speed_over_long_blocks_are_no_values_at_their_centre():
     time = np.arange(0.0, 20.0, 0.01)
     speed = np.gradient(swing(time), time, edge_order=2)

@@ -147,11 +147,16 @@ def _same(joints: Sequence[SmoothedJoint], others: Sequence[SmoothedJoint]) -> b
 
 
 def _extended(joint: SmoothedJoint, jumps: list[Jump], any_order: bool) -> SmoothedJoint:
-    """Return the joint with further jumps, or as it was where rounding spoils its likelihood with them."""
+    """Return the joint with further jumps, or as it was where rounding spoils its likelihood with them.
+
+    A jump that wins other joints may cost this one something, but once only: where it is known already, a wider one has
+    to gain.
+    """
     if not jumps:
         return joint
     extended = joint.with_jumps((*joint.jumps, *jumps), ORDERS if any_order else (joint.order,))
-    most_lost = MOST_LOST * len(jumps)
+    known = {(other.derivative, step) for other in joint.jumps for step in other.steps}
+    most_lost = MOST_LOST * sum((jump.derivative, jump.first) not in known for jump in jumps)
     return extended if extended.log_likelihood > joint.log_likelihood - most_lost else joint
 
 
