@@ -46,6 +46,8 @@ class _Page:
                 target = link["href"].removeprefix("#")
                 if link["href"].startswith("#") and target in places:
                     link["href"] = places[target]
+            for drawing in element.select("figure svg"):
+                drawing["style"] += "; max-width: 100%; height: auto"  # on narrow screens
             if element.name in HEADINGS:
                 anchor = element.get("id") or _slug(element.get_text())
                 parts.append(f"{'#' * (int(element.name[1]) - 1)} {_heading(element)} {{ #{anchor} }}")
