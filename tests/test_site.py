@@ -94,3 +94,15 @@ def test_every_link_leads_somewhere(site):
         if target not in pages or (anchor and anchor not in pages[target].names):
             broken.append((name, link))
     assert broken == []
+
+
+def test_the_drawings_of_the_manual_are_on_their_pages(site):
+    for name, caption in [("index", "From files to results"), ("tasks", "Frames, signs and quaternions")]:
+        page = (site / f"{name}.html").read_text(encoding="utf-8")
+        figure = page.partition("<figure")[2].partition("</figure>")[0]
+        assert "<svg" in figure, name
+        assert caption in figure.partition("<figcaption")[2], name
+
+
+def test_the_index_of_the_pdf_is_not_on_the_site(site):
+    assert not any("Index</h1>" in file.read_text(encoding="utf-8") for file in site.glob("*.html"))

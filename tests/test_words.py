@@ -85,7 +85,11 @@ def test_the_reference_of_the_manual_is_plain_english():
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", *(f"studies/manual/{name}.typ" for name in ("manual", "start", "tasks", "help"))]
+    "name",
+    [
+        "README.md",
+        *(f"studies/manual/{name}.typ" for name in ("manual", "start", "tasks", "help", "reports", "figures", "index")),
+    ],
 )
 def test_prose_is_plain_english(name):
     text = re.sub(r"```.*?```", "", (ROOT / name).read_text(encoding="utf-8"), flags=re.DOTALL)
