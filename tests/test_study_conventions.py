@@ -12,13 +12,16 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.conventions import find_conventions
+from studies.common.monte_carlo import read_store
 from studies.common.study import Verdict
 from studies.conventions import STUDY
 from studies.conventions.mistakes import MISTAKES
 from studies.conventions.right_studies import UNUSUAL, circumstances
 from studies.conventions.trials import Outcome, tasks, trial
 from studies.truth.hidden_causes import CASES
+from tests.pdf_text import PdfText
 
+REPORTS = Path(__file__).parents[1] / "reports"
 NAMED = Outcome("sign", True, "servicer3", 0.6, 1e-5, ("convention:sign:j",), ("convention:sign:j",), True, True, 2.0)
 QUIET = Outcome("leak", False, "servicer3", 0.6, 1e-5, (), (), True, True, 0.1)
 
@@ -67,3 +70,13 @@ def test_joints_that_cannot_be_so_fast_speak_for_seconds() -> None:
     number = [*MISTAKES].index("rates in counts")
     task = {"mistake": "rates in counts", "robot": "servicer3", "amplitude": 0.2, "noise": 1e-4, "seed": 9000 + number}
     assert "convention:unit:time" not in trial(task, np.random.default_rng(0))["said"]
+
+
+def test_the_committed_report_is_that_of_its_trials() -> None:
+    lines = read_store(REPORTS / "conventions.jsonl.gz")
+    outcomes = [Outcome(**line["result"]) for line in lines if "trial" in line]
+    assert len(outcomes) == len(tasks(full=True))
+    written = PdfText.read(REPORTS / "conventions.pdf")
+    for goal in STUDY.report(outcomes).goals:
+        for text in (goal.text, goal.reached, goal.verdict.value):
+            assert text in written
