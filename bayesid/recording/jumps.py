@@ -23,9 +23,9 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.stats import chi2
 
 from bayesid._math.arrays import Floats
+from bayesid._math.chi_square import log_tail
 from bayesid.recording.integrated_process import Jump
 from bayesid.recording.jump_placing import placed_jumps
 from bayesid.recording.smoothing import ORDERS, JointSamples, SmoothedJoint, smooth
@@ -89,7 +89,7 @@ class _Group(NamedTuple):
         """Sum the statistics of some joints."""
         statistic = np.sum([scores[index].statistic for index in members], axis=0)
         degrees = np.sum([scores[index].information > 0.0 for index in members], axis=0)
-        return cls(members, joints[members[0]].nodes, statistic, chi2.logsf(statistic, np.maximum(degrees, 1)))
+        return cls(members, joints[members[0]].nodes, statistic, log_tail(statistic, np.maximum(degrees, 1)))
 
     def leave_out(self, begin: float, end: float) -> None:
         """Look for no jump between two times."""

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.chi_square import log_tail
 from bayesid.diagnosis.noise.noise_fault import (
     FitResidual,
     FittedFault,
     NoiseFault,
     Sizes,
-    chi2_log_sf,
     number_of,
     register_fault,
 )
@@ -51,7 +51,7 @@ class EncoderNoise(NamedTuple):
     @property
     def log_p(self) -> float:
         """Logarithm of the p-value of the declared noise against more."""
-        return chi2_log_sf(self.ratio * self.degrees, self.degrees)
+        return float(log_tail(self.ratio * self.degrees, self.degrees))
 
     def log_gain(self, factor: float) -> float:
         """Return what the variance seen gains in log likelihood by noise of a factor times the declared one.

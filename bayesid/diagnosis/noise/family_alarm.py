@@ -12,6 +12,7 @@ import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
+from bayesid._math.chi_square import log_tail
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise import noise_faults
@@ -198,7 +199,7 @@ def log_p_of_a_period(pieces: list[tuple[Floats, Floats]]) -> float:
             norm = np.maximum((wave**2).sum(axis=1), 1e-9)
             energy += ((wave @ residual) ** 2).sum(axis=1) / norm
         degrees += 2 * residual.shape[1]
-    return float(min(0.0, np.log(count) + stats.chi2.logsf(energy.max(), degrees)))
+    return float(min(0.0, np.log(count) + log_tail(energy.max(), degrees)))
 
 
 def log_p_of_an_event(residuals: list[Floats]) -> float:
@@ -218,4 +219,4 @@ def log_p_of_an_event(residuals: list[Floats]) -> float:
             if len(energy):
                 strongest, tried = max(strongest, float(energy.max())), tried + len(energy)
             width *= 2
-    return float(min(0.0, np.log(max(tried, 1)) + stats.chi2.logsf(strongest, axes)))
+    return float(min(0.0, np.log(max(tried, 1)) + log_tail(strongest, axes)))

@@ -11,8 +11,6 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple, TypeVar
 
 import numpy as np
-from scipy import stats
-from scipy.special import gammaln
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
@@ -31,7 +29,6 @@ __all__ = [
     "NoiseFault",
     "SensorFault",
     "SensorResidual",
-    "chi2_log_sf",
     "noise_faults",
     "number_of",
     "register_fault",
@@ -340,17 +337,3 @@ def number_of(size: float | Sequence[float] | Floats) -> float:
     """Return the one number that a size is; raise a ValueError where it is several."""
     (number,) = np.atleast_1d(np.asarray(size, dtype=float)).tolist()
     return float(number)
-
-
-def chi2_log_sf(statistic: float, degrees: float) -> float:
-    """Return the logarithm of the upper tail of chi-square; far out, where it underflows, by a continued fraction.
-
-    Parameters
-    ----------
-    statistic, degrees : float
-    """
-    value = float(stats.chi2.logsf(statistic, degrees))
-    if np.isfinite(value):
-        return value
-    a, x = 0.5 * degrees, 0.5 * statistic
-    return float(a * np.log(x) - x - np.log(x - a + 1.0) - gammaln(a))  # the first term of the continued fraction

@@ -18,13 +18,13 @@ from scipy.optimize import minimize
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.chi_square import log_tail
 from bayesid.diagnosis.noise.noise_fault import (
     FitResidual,
     FittedFault,
     SensorFault,
     SensorResidual,
     Sizes,
-    chi2_log_sf,
     number_of,
     register_fault,
 )
@@ -65,7 +65,7 @@ class UnderstatedNoise(SensorFault):
 
     def log_p_of(self, residual: SensorResidual, posterior: Posterior) -> float:
         """Return the logarithm of the p-value of the declared variance against more."""
-        return chi2_log_sf(residual.energy, residual.degrees)
+        return float(log_tail(residual.energy, residual.degrees))
 
     def measured(self, fit: Fit, least: float = -np.inf, settings: DiagnosisSettings = DEFAULT_SETTINGS) -> FittedFault:
         """Return the factor that the sum of squares gives, with its standard deviation."""
