@@ -64,7 +64,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
         "Tables with this report: weighing-all.csv.",
         "How heavy is it?",
         "the arm is known.",
-        "not run in full",
+        "Not run in full",
         "python -m studies.weighing --full --seed 4",
         "ets7.urdf",
     ):

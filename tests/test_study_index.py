@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.common.study import Verdict
+from studies.common.study import NOT_FULL, Verdict
 from studies.index import index_text
 from tests.pdf_text import PdfText
 
@@ -22,8 +22,7 @@ def test_summaries_are_those_of_their_reports():
     assert found
     for file in found:
         summary, text = json.loads(file.read_text()), PdfText.read(file.with_suffix(".pdf"))
-        effort = "full run" if summary["full"] else "read it as an example, not as the result"
-        assert effort in text, file.name
+        assert (NOT_FULL in text) is not summary["full"], file.name
         assert summary["answer"] in text, file.name
         for goal in summary["goals"]:
             assert text.row(goal["text"], goal["reached"], goal["verdict"]), (file.name, goal["text"])

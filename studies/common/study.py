@@ -51,6 +51,10 @@ MADE: Mapping[str, Mapping[str, Any]] = {
 }
 
 
+# caution on the first page of a study that was not run in full
+NOT_FULL = "Not run in full: read this report as an example, not as the result."
+
+
 class Verdict(StrEnum):
     """What is said of a goal."""
 
@@ -161,9 +165,8 @@ class Report(Generic[R]):
     def document(self, result: R, output: Path) -> Document:
         """Return the printed report without its foot; the tables are written beside the output."""
         document = Document(self.title, self.subtitle)
-        effort = "full run" if self.full else "not run in full: read it as an example, not as the result"
-        entries = [("Question", self.question), ("Valid when", self.valid), ("Effort", effort)]
-        document.decision(self.answer, entries)
+        entries = [("Question", self.question), ("Valid when", self.valid)]
+        document.decision(self.answer, entries if self.full else [*entries, ("Caution", NOT_FULL)])
         if self.figure is not None:
             document.figure(*self.figure)
         rows = [[goal.text, goal.reached, goal.verdict.value] for goal in self.goals]
