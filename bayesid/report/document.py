@@ -26,7 +26,7 @@ from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
 from bayesid.report.figures.figure_style import with_plain_labels
 
-__all__ = ["Document", "Rows"]
+__all__ = ["Document", "LinkedText", "Rows"]
 
 Rows = list[list[str]]
 """Cells of a table, row by row."""
@@ -35,26 +35,38 @@ MANY_POINTS = 4000  # number of points above which a line or a scatter plot is d
 RESOLUTION = 250  # resolution of what is drawn as pixels [dots per inch]
 LONG_WORD = 14  # number of characters from which on a word in a table may break at its punctuation
 
-WHOLE = 24
+WHOLE = 12
 """Number of lines of a table above which it may break between two pages; the caption stays with the first of them."""
 
 ROOM = 1.15  # least distance of named ticks along a vertical axis, in heights of their letters
 LINE = 60  # number of characters of a table's cell that fill about one line
 
 HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3)
-"""Factors on the heights of figures and on the space in tables, tried in this order until the last page is filled."""
+"""Factors on the heights of figures and on the space in tables, tried in this order until every page is filled."""
 
-LOWEST = 0.55  # fraction of its text's height to which the last page is then filled at least
+FILLED = 0.7  # fraction of its text's height to which every page is then filled, where one of the factors permits
 
 LOOK = "document.typ"  # file beside this one that holds the look of every report
 
-_END = """
+_MARK = """
 #context {
   let at = here().position()
   [#metadata((at.page, (at.y - 20mm) / 255mm)) <end>]
 }
 """
-"""Mark at the end of the text: its page, and how far down the text's height it stands."""
+"""Mark at the end of a part: its page, and how far down the text's height it stands."""
+
+
+class LinkedText(str):
+    """Text of a table's cell that links to a file, whose path is relative to the report's, or to a web page."""
+
+    target: str
+
+    def __new__(cls, text: str, target: str) -> LinkedText:
+        """Return the text with its target."""
+        link = super().__new__(cls, text)
+        link.target = target
+        return link
 
 
 class Document:
@@ -73,6 +85,7 @@ class Document:
             f"#set document(title: {literal(title)}, date: none)\n",
             f"#title({literal(title)}, {literal(subtitle)}, {literal(date or '')})\n",
         ]
+        self._links: list[str] = []
         self._figures: list[Figure] = []
         self._drawn: list[bytes] = []
 
@@ -99,6 +112,10 @@ class Document:
     def mentions(self, pattern: str) -> bool:
         """Whether a regular expression occurs in the content added so far, except in figures."""
         return any(re.search(pattern, part) for part in self._parts[1:])
+
+    def link(self, text: str, target: str) -> None:
+        """Make every occurrence of a text a link to a file, whose path is relative to the report's."""
+        self._links.append(f"#show {literal(text)}: it => link({literal(target)}, it)\n")
 
     def foot(self, first: str, last: str = "") -> None:
         """Put a text in small print at the foot of the first page, and another at that of the last."""
@@ -179,12 +196,14 @@ class Document:
         ----------
         path : str or Path
         filled : bool
-            Whether all figures and tables may be made lower or higher by one of `HEIGHTS`, if that fills the last page.
+            Whether all figures and tables may be made lower or higher by one of `HEIGHTS`, if that fills the pages.
         """
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             source = folder / "main.typ"
-            source.write_text("".join([*self._parts, _END]), encoding="utf-8")
+            look, *content = self._parts
+            marked = [part + _MARK if _sets(part) else part for part in content]
+            source.write_text("".join([look, *self._links, *marked]), encoding="utf-8")
             factor = self._filling_height(source) if filled else 1.0
             drawn = self._drawn if factor == 1.0 else [_svg(fig, factor) for fig in self._figures]
             _write_all(folder, drawn)
@@ -193,22 +212,51 @@ class Document:
             part.write_bytes(pdf)
 
     def _filling_height(self, source: Path) -> float:
-        """Return the first factor with which the last page is filled to `LOWEST`, 1 where there is none."""
+        """Return the first factor with which all pages are filled to `FILLED`, or the one that comes nearest to it."""
+        flows = [_flows(part) for part in self._parts[1:] if _sets(part)]
+        fills: dict[float, float] = {}
         for factor in HEIGHTS:
             _write_all(source.parent, [_blank(fig, factor) for fig in self._figures])
             inputs = {"height": str(factor)}
-            found = typst.query(
-                str(source), "<end>", field="value", one=True, root=str(source.parent), sys_inputs=inputs
+            ends = json.loads(
+                typst.query(str(source), "<end>", field="value", root=str(source.parent), sys_inputs=inputs)
             )
-            page, depth = json.loads(found)
-            if page == 1 or depth >= LOWEST:
+            fills[factor] = _least_filled(ends, flows)
+            if fills[factor] >= FILLED:
                 return factor
-        return 1.0
+        return max(fills, key=lambda factor: fills[factor])
+
+
+def _sets(part: str) -> bool:
+    """Whether a part of a document sets something on its pages, and is no rule."""
+    return not part.startswith("#set")
+
+
+def _flows(part: str) -> bool:
+    """Whether a part of a document may begin on one page and end on the next."""
+    return part.startswith(("#par", "#list", "#{"))
+
+
+def _least_filled(ends: Sequence[tuple[int, float]], flows: Sequence[bool]) -> float:
+    """Return how far the emptiest page is filled, the only page of a document counting as full.
+
+    Parameters
+    ----------
+    ends : sequence of (int, float)
+        Page on which each part ends, and how far down.
+    flows : sequence of bool
+        Whether each part may begin on an earlier page, which it then fills.
+    """
+    depths = dict(ends)  # by page, that of the last part which ends there
+    for (before, _), (after, _), flowing in zip(ends, ends[1:], flows[1:], strict=False):
+        if after > before and flowing:
+            depths[before] = 1.0
+    return min(depths.values()) if len(depths) > 1 else 1.0
 
 
 def literal(text: str) -> str:
-    """Return plain text as a string literal of Typst, with no line broken between a number and its per cent sign."""
-    clean = re.sub(r"(?<=\d) (?=%)", "\u00a0", text.encode("utf-8", "replace").decode("utf-8"))
+    """Return plain text as a string literal of Typst, with no line broken in ``5 %`` and ``2 × 10⁻⁶``."""
+    clean = re.sub(r"(?<=\d) (?=[%×])|(?<=\d ×) (?=10)", "\u00a0", text.encode("utf-8", "replace").decode("utf-8"))
     escaped = clean.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return '"' + re.sub(r"[\x00-\x09\x0b-\x1f\x7f]", " ", escaped) + '"'
 
@@ -216,9 +264,13 @@ def literal(text: str) -> str:
 def _cell(text: str) -> str:
     """Return the Typst expression of a table's cell, whose long words may break after their punctuation.
 
-    An empty box allows the break: a zero-width space would be copied with the text.
+    An empty box allows the break: a zero-width space would be copied with the text. Options of commands stay whole.
     """
-    parts = re.sub(rf"\S{{{LONG_WORD},}}", lambda word: re.sub(r"([._/:\-])(?=\w)", "\\1\0", word[0]), text).split("\0")
+    if isinstance(text, LinkedText):
+        return f"link({literal(text.target)}, {_cell(str(text))})"
+    parts = re.sub(
+        rf"(?<!\S)(?!--)\S{{{LONG_WORD},}}", lambda word: re.sub(r"([._/:\-])(?=\w)", "\\1\0", word[0]), text
+    ).split("\0")
     return f"({', '.join(map(literal, parts))},).join(box())" if len(parts) > 1 else literal(text)
 
 
