@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
+from pypdf import PdfReader
 
 from bayesid.report import Document
 from bayesid.report.document import fitted_height
@@ -39,7 +40,7 @@ def weighed(result: float) -> Report[float]:
         subtitle="An example",
         question="How heavy is it?",
         answer=f"It weighs {result:g} kg.",
-        valid="the arm is known.",
+        valid="the arm is known. See the report on excitation.",
         goals=GOALS,
         full=False,
         figure=Picture(picture(4.0), "What decides."),
@@ -52,6 +53,12 @@ def weighed(result: float) -> Report[float]:
 
 
 STUDY = Study("weighing", "Weigh a box.", run=lambda seed, progress: float(seed), report=weighed, seed=4)
+
+
+def links(file: Path) -> set[str]:
+    """Return the targets of all links of a PDF."""
+    pages = PdfReader(file).pages
+    return {entry.get_object()["/A"]["/URI"] for page in pages for entry in page.get("/Annots", [])}
 
 
 def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
@@ -76,6 +83,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     kept = json.loads((tmp_path / "weighing.json").read_text())
     assert kept["answer"] == "It weighs 3.1 kg."
     assert kept["origin"] == origin
+    assert links(tmp_path / "weighing.pdf") == {"excitation.pdf", "weighing-all.csv"}
     assert [goal["verdict"] for goal in kept["goals"]] == ["PASS", "FAIL", "NOT TESTED"]
 
     with (tmp_path / "weighing-all.csv").open(newline="") as stream:

@@ -21,7 +21,7 @@ WANTED = 0.01  # relative standard deviation of the mass that is wanted from one
 LEVEL = 0.95  # level of the region of the sampled posterior that should hold the truth
 
 # what gives masses their scale where motion cannot
-WAY_OUT = "measured joint torques or a known thrust do (reports on the whole system and on base parameters)"
+WAY_OUT = "measured joint torques or a known thrust do (report on the whole system, report on base parameters)"
 
 
 def _report(result: BaseBody) -> Report[BaseBody]:
@@ -151,7 +151,7 @@ def _negatives(document: Document, result: BaseBody) -> None:
         f"{format_percent(float(result.precision['permitted, arm 5 %'][MASS]), 2)}, and with the best accelerometer of "
         f"section 4.3 ({format_number(GRADES[-1])} m/s²) by {format_percent(float(result.grades['5 %'][-1, MASS]), 2)} "
         "(faster manoeuvre). Measured joint torques, a known thrust or one known body would also provide the scale "
-        "(reports on the whole system and on base parameters).",
+        "(report on the whole system, report on base parameters).",
         f"The poorly exciting manoeuvre, whose rate about z peaks at {format_fixed(1e3 * float(poor.peak[2]), 2)} "
         f"mrad/s, loses nothing without noise; with noise izz is {format_fixed(float(loss[6]), 1)} and ixy "
         f"{format_fixed(float(loss[7]), 1)} times more uncertain.",

@@ -27,6 +27,24 @@ TERMS = {
     "rms": "root mean square",
 }
 
+# studies by the subject with which reports mention them, as in "the report on excitation"
+SUBJECTS = {
+    "base parameters": "base_parameters",
+    "blind injections": "blind_injections",
+    "calibration": "calibration",
+    "cost": "cost",
+    "excitation": "excitation",
+    "sensors": "sensors",
+    "the base body": "base_body",
+    "the whole system": "whole_system",
+}
+
+
+def link_reports(document: Document) -> None:
+    """Make every mention of a study's report a link to it, as a file in the same folder."""
+    for subject, study in SUBJECTS.items():
+        document.link(f"report on {subject}", f"{study}.pdf")
+
 
 def glossary(document: Document) -> str:
     """Return the meanings of the terms that a document holds as whole words, in one sentence; nothing without any."""

@@ -24,7 +24,7 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.app.options import executor_at
 from bayesid.report import Document
 from studies.common.provenance import MODELS, study_origin
-from studies.common.report_parts import glossary
+from studies.common.report_parts import glossary, link_reports
 
 R = TypeVar("R")
 
@@ -186,6 +186,9 @@ class Report(Generic[R]):
             rows = [[statement.text, statement.finding.value, statement.reason] for statement in self.statements]
             document.table(["the paper", "finding", "why"], rows, "Statements of the paper.", ["left"] * 3)
         files = [table.write(output) for table in self.tables]
+        for file in files:
+            document.link(file, file)
+        link_reports(document)
         if files and self.beside:
             document.paragraph(self.beside.format(*files, all=", ".join(files)))
         return document

@@ -92,7 +92,7 @@ def _report(result: Result) -> Report[Result]:
         setup=Setup(
             robot=f"ETS-VII with drawn bodies, 1 sigma {format_percent(2.0 * SPREAD)} of the base mass and 5 % of each "
             f"link mass; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
-            manoeuvre="Identification: the d-optimal manoeuvre of the excitation study, "
+            manoeuvre="Identification: the d-optimal manoeuvre of the report on excitation, "
             f"{mission.DURATION:g} s within 50 mm/s and 5 degrees per second. Planned path: quintics from rest to rest "
             f"in the same time, in the first plan with joint excursions of {format_vector(EXCURSION, 2)} rad and at "
             f"most {format_number(1e3 * result.course.largest('tip_speed'))} mm/s.",
