@@ -168,7 +168,7 @@ def test_format_number(value, text):
 
 def test_numbers_have_true_minus_signs_and_no_negative_zero():
     assert [format_fixed(value, 2) for value in (-1.5, -0.001, 2.0)] == ["−1.50", "0.00", "2.00"]
-    assert [format_signed(value) for value in (3.14, -2.0)] == ["+3.1", "−2.0"]
+    assert [format_signed(value) for value in (3.14, -2.0, -0.04, 0.0)] == ["+3.1", "−2.0", "0.0", "0.0"]
     assert format_vector([0.1, -2.0, 1e-5]) == "(0.1, −2, 1 × 10⁻⁵)"
 
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable
 
 __all__ = [
+    "NO_VALUE",
     "format_fixed",
     "format_number",
     "format_p_value",
@@ -22,6 +23,9 @@ __all__ = [
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+NO_VALUE = "–"
+"""Cell of a table that has no number."""
 
 LARGEST, SMALLEST = 6, -3  # exponents from which on, and down to which, a number is written with its power of ten
 SMALLEST_P = 1e-12  # p-value below which only the bound is printed
@@ -76,8 +80,9 @@ def format_fixed(value: float, decimals: int) -> str:
 
 
 def format_signed(value: float, decimals: int = 1) -> str:
-    """Return a number to so many decimals with its sign, plus or minus."""
-    return _minus(f"{value:+.{decimals}f}")
+    """Return a number to so many decimals with its sign, plus or minus; what rounds to zero has none."""
+    text = f"{value:+.{decimals}f}"
+    return _minus(text if float(text) else text[1:])
 
 
 def format_percent(ratio: float, digits: int | None = None) -> str:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, TRUTH, shared_legend, styled, wide_figure
-from bayesid.report.numbers import format_number, format_percent
+from bayesid.report.numbers import NO_VALUE, format_number, format_percent
 from studies.base_body import paper
 from studies.base_body.analysis import GRADES, BaseBody
 from studies.common.ets7 import BASE
@@ -32,8 +32,8 @@ CASES = {
 def case_table(result: BaseBody) -> Table:
     """Return the worst errors and the misfit of every noise-free case, those of the paper first."""
     cases = [
-        ("the paper, well exciting", paper.RESULT_WELL / paper.TRUTH - 1.0, "–"),
-        ("the paper, poorly exciting", paper.RESULT_POOR / paper.TRUTH - 1.0, "–"),
+        ("the paper, well exciting", paper.RESULT_WELL / paper.TRUTH - 1.0, NO_VALUE),
+        ("the paper, poorly exciting", paper.RESULT_POOR / paper.TRUTH - 1.0, NO_VALUE),
         *((CASES[name], case.error, format_number(case.misfit, 2)) for name, case in result.noise_free.items()),
     ]
     groups = (slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 10))

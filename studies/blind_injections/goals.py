@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 
 from bayesid.diagnosis import Status
+from bayesid.report.numbers import NO_VALUE
 from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import CASES, EXPLAINING, Trial
 from studies.common.study import Goal, Verdict
@@ -130,7 +131,7 @@ def _scatter(text: str, errors: np.ndarray) -> Goal:
     """Return the goal on errors in stated standard deviations: their root mean square, within two standard errors."""
     text = f"errors of {text} in stated sd: rms 0.9 to 1.1"
     if len(errors) < 2:
-        return Goal(text, "-", Verdict.NOT_TESTED)
+        return Goal(text, NO_VALUE, Verdict.NOT_TESTED)
     rms = float(np.sqrt((errors**2).mean()))
     error = float((errors**2).std() / (2.0 * rms * np.sqrt(len(errors))))
     verdict = Verdict.between(rms - 2.0 * error, rms + 2.0 * error, 0.9, 1.1)
@@ -171,7 +172,7 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     least, most = COVERAGE
     text = f"95 % intervals of amplitudes contain the truth: {100.0 * least:g} to {100.0 * most:g} %"
     if len(trials) < 2:
-        return Goal(text, "-", Verdict.NOT_TESTED)
+        return Goal(text, NO_VALUE, Verdict.NOT_TESTED)
     covered = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])
     counts = np.array([len(errors) for errors in trials])
     share = float(covered.sum() / counts.sum())

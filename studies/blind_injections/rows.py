@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from bayesid._math.arrays import Floats
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
-from bayesid.report.numbers import format_signed
+from bayesid.report.numbers import NO_VALUE, format_signed
 from studies.blind_injections.trials import Trial
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)  # limits of the ranges of signal-to-noise ratio in the table
@@ -38,7 +38,8 @@ def _row(trials: Sequence[Trial]) -> list[str]:
     keys = ("alarmed", "in_set", "named_rightly", "misnamed")
     alarmed, in_set, named, misnamed = (str(sum(getattr(trial, key) for trial in trials)) for key in keys)
     limits = [(t.detection, t.detection * t.naming) for t in trials if t.detection is not None and t.naming is not None]
-    detection, naming = (f"{sum(column):.1f}" for column in zip(*limits, strict=True)) if limits else ("–", "–")
+    sums = (f"{sum(column):.1f}" for column in zip(*limits, strict=True))
+    detection, naming = sums if limits else (NO_VALUE, NO_VALUE)
     return [str(len(trials)), alarmed, detection, in_set, named, naming, misnamed]
 
 
@@ -138,7 +139,7 @@ def errors(trials: Sequence[Trial]) -> list[list[str]]:
 def _scattered(label: str, values: Sequence[float]) -> list[str]:
     errors: Floats = np.asarray(values, dtype=float)
     if len(errors) == 0:
-        return [label, "0", "–", "–", "–", "–"]
+        return [label, "0", *[NO_VALUE] * 4]
     inside = [f"{100.0 * (np.abs(errors) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
     return [label, str(len(errors)), format_signed(errors.mean(), 2), f"{np.sqrt((errors**2).mean()):.2f}", *inside]
 

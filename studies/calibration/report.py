@@ -12,7 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.importance import TRUSTED
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number, format_p_value, format_percent
+from bayesid.report.numbers import NO_VALUE, format_number, format_p_value, format_percent
 from studies.calibration import replicate
 from studies.calibration.data import (
     ARM_SPREAD,
@@ -301,13 +301,13 @@ def _coverage_rows(cases: Sequence[Replicates]) -> list[list[str]]:
             ranks = runs.bodies(method)
             if len(ranks) > 1:
                 cells = [_percent(*replicate.coverage(ranks, level)) for level in LEVELS]
-                doubt = bad if method is Method.IMPORTANCE else "-"
+                doubt = bad if method is Method.IMPORTANCE else NO_VALUE
                 rows.append([f"{runs.case}: {method}", str(len(ranks)), *cells, doubt])
     for method in Method:
         every = [made for runs in cases if len(made := runs.bodies(method))]
         if every:
             cells = [_percent(*pooled_coverage(every, level)) for level in LEVELS]
-            rows.append([f"{ALL}: {method}", str(sum(map(len, every))), *cells, "-"])
+            rows.append([f"{ALL}: {method}", str(sum(map(len, every))), *cells, NO_VALUE])
     return rows
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figure
-from bayesid.report.numbers import format_number
+from bayesid.report.numbers import NO_VALUE, format_number, format_signed
 from studies.benchmark.run import EVALUATED
 from studies.common.provenance import MODELS, processor
 from studies.common.report_parts import columns
@@ -196,7 +196,7 @@ def _phases(document: Document, cost: Cost) -> None:
         warm, memory = runs[1:], max(run.memory for run in runs)
         phases_of = ", ".join(f"{phase} {np.median([r.phases[phase] for r in warm]):.1f}" for phase in runs[-1].phases)
         walls = _spread([run.wall for run in warm])
-        rows.append([name, f"{runs[0].wall:.1f}", walls, f"{memory:.2f}", phases_of or "-"])
+        rows.append([name, f"{runs[0].wall:.1f}", walls, f"{memory:.2f}", phases_of or NO_VALUE])
     silent = [name for name, runs in cost.commands.items() if not runs[-1].phases]
     unsaid = f" The files of {joined(silent)} state no time by phase." if silent else ""
     if rows:
@@ -223,7 +223,7 @@ def _compared(document: Document, cost: Cost) -> None:
                 continue
             was, now = float(np.median(earlier)), middle(runs, lambda run: run.wall)
             if abs(now / was - 1.0) > CHANGED:
-                change = f"{100.0 * (now / was - 1.0):+.0f}".replace("-", "−")
+                change = format_signed(100.0 * (now / was - 1.0), 0)
                 rows.append([f"diagnose ({name})" if kind == "diagnose" else name, f"{was:.1f}", f"{now:.1f}", change])
     within = f"within {100.0 * CHANGED:.0f} % of the run that wrote {cost.before.name}"
     if not rows:

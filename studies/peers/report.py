@@ -14,7 +14,7 @@ from bayesid._io.words import counted, joined
 from bayesid._math.arrays import Floats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, TRUTH, styled, wide_figure
-from bayesid.report.numbers import format_signed
+from bayesid.report.numbers import NO_VALUE, format_signed
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.monte_carlo import Workers, read_store, run_trials
@@ -319,13 +319,13 @@ def _rows(made: Made, unknowns: int) -> list[list[str]]:
         result = _result_of(made, unknowns, name)
         if result is None:
             continue
-        sampled = f"{result['effective_samples']:,.0f}" if result["effective_samples"] > 0.0 else "-"
-        compared = ["-", "-"]
+        sampled = f"{result['effective_samples']:,.0f}" if result["effective_samples"] > 0.0 else NO_VALUE
+        compared = [NO_VALUE, NO_VALUE]
         if name != REFERENCE and package is not None:
             least, needed = "> " if _is_bound(result) else "", _needed(result)
             compared = [f"{least}{needed:,.0f}", f"{least}{needed / package['seconds']:.1f}"]
         error = _evidence_error(made, unknowns, name)
-        evidence = "-" if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}"
+        evidence = NO_VALUE if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}"
         numbers = [f"{result['seconds']:.0f}", f"{result['evaluations']:,}", sampled, *compared, evidence]
         rows.append([f"{unknowns}, {name}", *numbers])
     return rows

@@ -250,7 +250,7 @@ def factor_figure(result: Result) -> Figure:
         axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in analysis.STAGES])
         axes.set(title=f"hidden: {HIDDEN[hidden.truth]}", xlim=(-0.5, place[-1] + 0.5))
         axes.set_yscale("symlog", linthresh=1.0)
-        axes.set_yticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
+        axes.set_yticks(TICKS, list(map(format_number, TICKS)))
         axes.grid(visible=False, axis="x")
         axes.legend(loc="upper left")
     figure.axes[0].set_ylabel("log Bayes factor")
@@ -268,7 +268,7 @@ def _direction_figure(result: Result) -> Figure:
         axes.axvline(RIVALRY, color="#888888", linewidth=0.8)
         axes.set(xlabel="expected ln B", title=f"hidden: {NAMES[truth]}")
         axes.set_xscale("symlog", linthresh=1.0)
-        axes.set_xticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
+        axes.set_xticks(TICKS, list(map(format_number, TICKS)))
     figure.axes[0].set_ylabel("share of directions")
     shared_legend(figure, figure.axes[0], len(analysis.STAGES))
     return figure
