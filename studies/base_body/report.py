@@ -11,7 +11,7 @@ from bayesid.report.numbers import format_fixed, format_number, format_percent
 from bayesid.simulation.sensors import SensorKind
 from studies.base_body import paper, tables
 from studies.base_body.analysis import CLAIM, GRADES, BaseBody, limits_broken, run
-from studies.common.ets7 import PERIOD, RAMP, TIP_SPEED, ets7, excitation, extended_wrist, tip_speed
+from studies.common.ets7 import PERIOD, POSES, RAMP, TIP_SPEED, ets7, excitation, extended_wrist, tip_speed
 from studies.common.quantities import MASS, MOMENTS
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
@@ -68,8 +68,8 @@ def _report(result: BaseBody) -> Report[BaseBody]:
             "calibration.",
         ),
         picture=Picture(
-            robot_pose(ets7(), motion, np.linspace(0.0, motion.duration, 5)[:-1]),
-            "The robot at four instants of the paper's manoeuvre.",
+            robot_pose(ets7(), motion, POSES),
+            "The robot at four instants of the paper's manoeuvre: at rest, and in half of an oscillation.",
         ),
         sections=[_negatives, _evidence, _assumptions],
         statements=_statements(result),

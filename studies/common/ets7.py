@@ -51,6 +51,9 @@ CORNER = 4.0
 # mrad/s at most
 PERIOD, RAMP, PERIODS = 30.0, 30.0, 2
 
+# instants of this excitation with different poses [s]: at rest, and in half of an oscillation, which then goes back
+POSES = np.array([0.0, RAMP, RAMP + 0.25 * PERIOD, RAMP + 0.5 * PERIOD])
+
 
 @cache
 def ets7() -> Robot:

@@ -306,6 +306,8 @@ def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
     place, left = np.arange(len(answers)), np.zeros(len(answers))
     for (key, title), colour in zip(OUTCOMES.items(), COLOURS[2:5], strict=True):
         counts = np.array([of_kind.get(key, 0) for of_kind in answers.values()])
+        if not counts.any():  # a legend would promise bars that are not there
+            continue
         axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
         left = left + counts
     axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))

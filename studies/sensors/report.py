@@ -11,7 +11,7 @@ from bayesid.report import Document
 from bayesid.report.figures import robot_pose
 from bayesid.report.numbers import format_fixed, format_percent, format_range, format_text
 from studies.base_body import paper
-from studies.common.ets7 import ACCELEROMETER, INTERVAL, TIP_SPEED, ets7, tip_speed
+from studies.common.ets7 import ACCELEROMETER, INTERVAL, POSES, TIP_SPEED, ets7, tip_speed
 from studies.common.quantities import JUDGED, MASS
 from studies.common.report_parts import columns
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
@@ -68,8 +68,8 @@ def _report(result: Result) -> Report[Result]:
             f"{len(result.levels)} levels, {len(next(iter(result.joints.values())))} treatments of the joints.",
         ),
         picture=Picture(
-            robot_pose(ets7(), planned, np.linspace(0.0, planned.duration, 5)[:-1]),
-            "The robot at four instants of the paper's manoeuvre.",
+            robot_pose(ets7(), planned, POSES),
+            "The robot at four instants of the paper's manoeuvre: at rest, and in half of an oscillation.",
         ),
         sections=[_negatives, _evidence],
         statements=_statements(result),
