@@ -153,7 +153,7 @@ def _negatives(document: Document, result: BaseBody) -> None:
         "(faster manoeuvre). Measured joint torques, a known thrust or one known body would also provide the scale "
         "(report on the whole system, report on base parameters).",
         f"The poorly exciting manoeuvre, whose rate about z peaks at {format_fixed(1e3 * float(poor.peak[2]), 2)} "
-        f"mrad/s, loses nothing without noise; with noise izz is {format_fixed(float(loss[6]), 1)} and ixy "
+        f"mrad/s, loses nothing without noise; with noise I zz is {format_fixed(float(loss[6]), 1)} and I xy "
         f"{format_fixed(float(loss[7]), 1)} times more uncertain.",
         "The printed optimum exceeds the joint limits of ±π/2 that the paper states: "
         + "; ".join(

@@ -14,7 +14,7 @@ from bayesid.report.numbers import NO_VALUE, format_number, format_percent
 from studies.base_body import paper
 from studies.base_body.analysis import GRADES, BaseBody
 from studies.common.ets7 import BASE
-from studies.common.quantities import HEADINGS, LABELS, squared_distances
+from studies.common.quantities import LABELS, squared_distances
 
 Table = tuple[list[str], list[list[str]]]
 
@@ -28,12 +28,17 @@ CASES = {
     "well, arm 1/7": "well exciting, arm of 1/7 of the base's mass",
 }
 
+# relative errors of the results that the paper prints
+PAPER = {
+    "the paper, well exciting": paper.RESULT_WELL / paper.TRUTH - 1.0,
+    "the paper, poorly exciting": paper.RESULT_POOR / paper.TRUTH - 1.0,
+}
+
 
 def case_table(result: BaseBody) -> Table:
     """Return the worst errors and the misfit of every noise-free case, those of the paper first."""
     cases = [
-        ("the paper, well exciting", paper.RESULT_WELL / paper.TRUTH - 1.0, NO_VALUE),
-        ("the paper, poorly exciting", paper.RESULT_POOR / paper.TRUTH - 1.0, NO_VALUE),
+        *((name, error, NO_VALUE) for name, error in PAPER.items()),
         *((CASES[name], case.error, format_number(case.misfit, 2)) for name, case in result.noise_free.items()),
     ]
     groups = (slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 10))
@@ -48,10 +53,17 @@ def precision_table(result: BaseBody) -> Table:
     """Return the relative standard deviation of every quantity by speed and knowledge of the arm."""
     columns = result.precision
     rows = [
-        [heading, *(format_percent(float(column[index]), 2) for column in columns.values())]
-        for index, heading in enumerate(HEADINGS)
+        [label, *(format_number(100.0 * float(column[index]), 2) for column in columns.values())]
+        for index, label in enumerate(LABELS)
     ]
-    return ["quantity", *columns], rows
+    return ["quantity", *(f"{_flown(name, result)} [%]" for name in columns)], rows
+
+
+def _flown(name: str, result: BaseBody) -> str:
+    """Return a speed and what is known of the arm, as figures and tables call them."""
+    speed, _, arm = name.partition(", arm ")
+    speed = "permitted speed" if speed == "permitted" else f"{result.slowness:.1f} times faster"
+    return f"{speed}, arm {arm if arm == 'exact' else f'uncertain by {arm}'}"
 
 
 def squared_distance(identified: Identification) -> float:
@@ -103,15 +115,16 @@ def precision_figure(result: BaseBody) -> Figure:
     figure = wide_figure(2.9)
     axes = figure.subplots()
     looks = {
-        "permitted, arm exact": (AFTER, "o", "at the permitted speed, arm exact"),
-        "permitted, arm 5 %": (AFTER, "s", "at the permitted speed, arm uncertain by 5 %"),
-        "faster, arm exact": (COLOURS[5], "^", f"{result.slowness:.1f} times faster, arm exact"),
-        "faster, arm 5 %": (COLOURS[5], "v", f"{result.slowness:.1f} times faster, arm uncertain by 5 %"),
+        "permitted, arm exact": (AFTER, "o"),
+        "permitted, arm 5 %": (AFTER, "s"),
+        "faster, arm exact": (COLOURS[5], "^"),
+        "faster, arm 5 %": (COLOURS[5], "v"),
     }
     place = np.arange(len(LABELS))
     for shift, (name, values) in zip((-0.24, -0.08, 0.08, 0.24), result.precision.items(), strict=True):
-        colour, marker, label = looks[name]
+        colour, marker = looks[name]
         face = colour if name.endswith("exact") else "white"
+        label = _flown(name, result)
         axes.plot(place + shift, 100.0 * values, marker, color=colour, label=label, markersize=5, mfc=face)
     axes.set(yscale="log", ylabel="relative sd [%]")
     axes.set_xticks(place, LABELS)
@@ -122,23 +135,22 @@ def precision_figure(result: BaseBody) -> Figure:
 @styled
 def error_figure(result: BaseBody) -> Figure:
     """Draw the relative errors of the ten quantities, the paper's and those of this study."""
-    figure = wide_figure(3.4)
+    figure = wide_figure(3.7)
     axes = figure.subplots()
     series = {
-        "paper, well exciting": paper.RESULT_WELL / paper.TRUTH - 1.0,
-        "paper, poorly exciting": paper.RESULT_POOR / paper.TRUTH - 1.0,
-        **{f"here, {name}": case.error for name, case in result.noise_free.items()},
+        **PAPER,
+        **{CASES[name]: case.error for name, case in result.noise_free.items()},
     }
     place = np.arange(len(LABELS))
     for index, (name, error) in enumerate(series.items()):
         marker = "os^vDPX*"[index % 8]
-        colour = BEFORE if name.startswith("paper") else AFTER
+        colour = BEFORE if name in PAPER else AFTER
         axes.plot(place + 0.06 * (index - 3.5), np.abs(error), marker, color=colour, label=name, markersize=4)
     axes.axhline(1e-6, color="black", linewidth=0.8, linestyle="--")
     axes.text(place[-1] + 0.4, 1.2e-6, "goal", ha="right", va="bottom")
     axes.set(yscale="log", ylabel="relative error")
     axes.set_xticks(place, LABELS)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=4)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2)
     return figure
 
 
@@ -159,10 +171,10 @@ def posterior_figure(result: BaseBody) -> Figure:
                 markersize=3,
                 capsize=2,
                 color=(AFTER, COLOURS[5])[index],
-                label=f"posterior, arm {name}",
+                label=f"posterior, arm {name if name == 'exact' else f'uncertain by {name}'}",
             )
-        for printed, marker, name in ((paper.RESULT_WELL, "x", "paper, well"), (paper.RESULT_POOR, "+", "paper, poor")):
-            error = 100.0 * (printed / paper.TRUTH - 1.0)[pick]
+        for (name, printed), marker in zip(PAPER.items(), "x+", strict=True):
+            error = 100.0 * printed[pick]
             axes.plot(place, error, marker, color=BEFORE, label=name, markersize=5)
             for x, value in zip(place, error, strict=True):
                 if axes is panels[0] and abs(value) > REACH:

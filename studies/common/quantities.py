@@ -12,10 +12,11 @@ from bayesid.robot.inertial_parameters import InertialParameters
 MASS, MOMENTS = 0, [4, 5, 6]  # indices of the mass and of the three moments of inertia
 JUDGED = [MASS, *MOMENTS]  # indices of the quantities by which studies judge an identification; the others may be zero
 
-# short names for the axes of figures, such as ``I xx``
+# names in figures and tables, such as ``I xx``, and the same with units, such as ``I xx [kg m²]``
 LABELS = [key.replace("inertia.", "I ").replace("com.", "c ") for key in BODY_QUANTITIES]
+ROWS = [f"{label} [{format_unit(unit)}]" for label, unit in zip(LABELS, BODY_QUANTITIES.values(), strict=True)]
 
-# names with units for the rows of tables, such as ``inertia.xx [kg m²]``
+# names with units in the CSV files beside reports, by the keys of the package, such as ``inertia.xx [kg m²]``
 HEADINGS = [f"{key} [{format_unit(unit)}]" for key, unit in BODY_QUANTITIES.items()]
 
 

@@ -27,7 +27,7 @@ from studies.common.ets7 import (
 )
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.provenance import MODELS
-from studies.common.quantities import HEADINGS
+from studies.common.quantities import HEADINGS, ROWS
 from studies.common.report_parts import add_number_table
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.ets7_limits.analysis import LONGEST, Answer, Result, run
@@ -183,10 +183,15 @@ def _evidence(document: Document, result: Result) -> None:
     columns = (designed.prior, flight.uncertain, flight.exact, designed.uncertain, designed.exact)
     add_number_table(
         document,
-        ["base", "true", "prior", "flight, arm 5 %", "flight, exact", "designed, arm 5 %", "designed, exact"],
+        [
+            "base",
+            "true",
+            "prior",
+            *(f"{name}, arm {arm}" for name in ("flight", "designed") for arm in ("5 %", "exact")),
+        ],
         [
             [heading, format_number(designed.truth[k], 4), *(format_number(float(sd[k]), 3) for sd in columns)]
-            for k, heading in enumerate(HEADINGS)
+            for k, heading in enumerate(ROWS)
         ],
         "Standard deviations after one manoeuvre with the mission sensors and unknown bias.",
     )

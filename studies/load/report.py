@@ -17,7 +17,7 @@ from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, shared_l
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed
 from studies.common import mission
 from studies.common.ets7 import BIAS
-from studies.common.quantities import HEADINGS, LABELS, MASS
+from studies.common.quantities import HEADINGS, LABELS, MASS, ROWS
 from studies.common.report_parts import add_number_table
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.load import loops, paper
@@ -191,7 +191,7 @@ def _failures(document: Document, result: Result) -> None:
 def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     rows = []
-    for k, title in enumerate(HEADINGS):
+    for k, title in enumerate(ROWS):
         cells = [
             format_quantity(flight.bodies[-1].mean[k], flight.bodies[-1].sd[k]) for flight in result.flights.values()
         ]
@@ -199,7 +199,7 @@ def _evidence(document: Document, result: Result) -> None:
         rows.append([title, format_number(paper.TRUTH[k], 4), format_number(paper.GUESS[k], 3), *printed, *cells])
     add_number_table(
         document,
-        ["load", "true", "guess", "paper 1", "paper 2", *TITLES.values()],
+        ["load", "true", "guess", "paper, iteration 1", "paper, iteration 2", *TITLES.values()],
         rows,
         "The load: printed values after the paper's two iterations, without noise, and posterior mean ± sd after the "
         "last manoeuvre of the loop.",

@@ -42,9 +42,6 @@ TITLES = {
     Recipe.SYSID: "mujoco.sysid",
 }
 
-# short titles of the recipes
-SHORT = {Recipe.BAYESID: "bayesid", Recipe.SCIPY: "SciPy, Pinocchio", Recipe.SYSID: "mujoco.sysid"}
-
 TICKS = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # ticks of times in the figure [s]
 Made = Sequence[Mapping[str, Any]]  # trials that were made: ``task`` and ``result``
 
@@ -459,7 +456,9 @@ def error_figure(made: Made) -> Figure:
             axes.plot(place + np.linspace(-0.25, 0.25, len(errors)), errors, ".", color=colour)
         for limit in (-SIGMAS, SIGMAS):
             axes.axhline(limit, color=TRUTH, linewidth=0.8)
-        axes.set_xticks(range(len(Recipe)), [SHORT[recipe] for recipe in Recipe])
+        axes.set_xticks(
+            range(len(Recipe)), [TITLES[recipe].partition(":")[0].replace(" around ", " around\n") for recipe in Recipe]
+        )
         axes.set_title(title)
     panels[0].set_ylabel("error [stated sd]")
     return figure

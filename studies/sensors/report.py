@@ -51,7 +51,7 @@ def _report(result: Result) -> Report[Result]:
             tables.level_figure(result),
             "Root mean square error of mass and worst moment after one manoeuvre, by level of noise, over "
             f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last labels give star tracker, "
-            "accelerometer [m/s²] and encoder [rad]. Grey: the paper's 2 %.",
+            "accelerometer [m/s²] and encoder [rad]. Grey: the paper's 2 %. The likelihood is the package's.",
         ),
         setup=Setup(
             robot="ETS-VII with the paper's base and a public arm, flown by an independent simulator (MuJoCo).",
@@ -256,8 +256,8 @@ def _evidence(document: Document, result: Result) -> None:
     document.table(
         [
             "noise",
-            *(name if name != EXACT else "joints exact" for name in names),
-            "joints exact, velocity: (21)",
+            *(name if name != EXACT else "exact joints" for name in names),
+            "exact joints, velocity: (21)",
             PAPER,
         ],
         [

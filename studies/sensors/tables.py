@@ -137,9 +137,9 @@ def level_figure(result: Result) -> Figure:
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     series = (
         (PAPER, BEFORE, -0.12, {name: uses[PAPER] for name, uses in result.accelerometers.items()}),
-        ("the package's likelihood", AFTER, 0.12, {name: uses[LIKELIHOOD] for name, uses in result.joints.items()}),
+        (LIKELIHOOD, AFTER, 0.12, {name: uses[LIKELIHOOD] for name, uses in result.joints.items()}),
     )
-    for axes, title in zip(panels, ("mass", "moment with the largest error"), strict=True):
+    for axes, title in zip(panels, ("mass", "worst moment"), strict=True):
         for label, colour, shift, spreads in series:
             chosen = [(spread, MASS if title == "mass" else spread.worst()) for spread in spreads.values()]
             size, error = (100.0 * np.array([getattr(s, key)[k] for s, k in chosen]) for key in ("rms", "rms_error"))
@@ -160,7 +160,7 @@ def treatment_figure(tables: Mapping[str, Mapping[str, Spread]]) -> Figure:
     figure = wide_figure(0.72 + 0.125 * len(names))
     panels = figure.subplots(1, len(tables), sharey=True, squeeze=False)[0]
     for axes, (level, spreads) in zip(panels, tables.items(), strict=True):
-        for index, (label, chosen) in enumerate((("mass", [MASS]), ("moment with the largest error", MOMENTS))):
+        for index, (label, chosen) in enumerate((("mass", [MASS]), ("worst moment", MOMENTS))):
             _bars(axes, [spreads[name] for name in names], chosen, index, label)
         axes.axvline(0.0, color="#888888", linewidth=0.6)
         axes.set(title=level, xlabel="error [%]")
