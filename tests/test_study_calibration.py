@@ -91,7 +91,7 @@ def test_intervals_that_are_too_narrow_fail_and_what_was_not_run_is_not_tested()
     assert verdicts(right)[ninety] is Verdict.PASS
     assert verdicts(right[:2])[ninety] is Verdict.OPEN
     assert verdicts([*right[:-1], made_up(right[-1].case, 100, 1.5)])[ninety] is Verdict.FAIL
-    assert verdicts(right)["ranks uniform, emcee: unknown arm and whole system"] is Verdict.NOT_TESTED
+    assert verdicts(right)["ranks uniform (corrected p above 0.01), emcee: unknown arm and whole system"] is Verdict.NOT_TESTED
     shares = interval_coverage(right)
     assert shares[ALL, 0.9].share == pytest.approx(0.9, abs=4.0 * shares[ALL, 0.9].error)
 

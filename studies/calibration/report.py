@@ -56,7 +56,7 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
     for case, planned in REPLICATES.items():
         mine = next((runs for runs in cases if runs.case is case), None)
         made = 0 if mine is None else len(mine.results)
-        text = f"ranks uniform, {planned:,} replicates: {case}"
+        text = f"ranks uniform (corrected p above {FAMILYWISE:g}), {planned:,} replicates: {case}"
         if mine is None or made == 0:
             goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
             continue
@@ -77,7 +77,8 @@ def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     )
     goals = []
     for level in LEVELS:
-        text = f"{format_percent(level)} intervals contain that share of the true values in every case"
+        share = f"{format_percent(level)} intervals contain that share of the true values in every case"
+        text = f"{share} (corrected p above {FAMILYWISE:g})"
         mine = [key for key in coverages if key[1] == level]
         if not mine:
             goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
@@ -91,7 +92,7 @@ def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
 
 def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
     """Return the goal on emcee where the arm is unknown, which is judged like the others once it is run there."""
-    text = "ranks uniform, emcee: unknown arm and whole system"
+    text = f"ranks uniform (corrected p above {FAMILYWISE:g}), emcee: unknown arm and whole system"
     p_values = {
         (runs.case, name): replicate.uniform_p_value(ranks)
         for runs in cases

@@ -32,6 +32,9 @@ BETTER = 100.0
 FAR = 3.0  # errors of one number that should not be exceeded [standard deviations]
 REACH = 1.96  # half-width of a 95 % band [standard deviations]
 
+# what `Attitude.errors` are, as answer and text call it
+ANGLE = "the angle between simulated and measured attitude (rms over time and recordings)"
+
 Cases = Mapping[str, Case]  # cases by what is known of the base
 
 
@@ -106,8 +109,8 @@ def _answer(known: str, case: Case) -> str:
     else:
         text += f"names nothing (verdict: {case.diagnosis.verdict.status.value})"
     if not case.diagnosis.verdict.causes:
-        return f"{text}, and the attitude error stays at {before} degrees (rms)."
-    return f"{text}; with these causes the attitude error is {after} degrees (rms), without them {before}."
+        return f"{text}, and {ANGLE} stays at {before} degrees."
+    return f"{text}; {ANGLE} is {after} degrees with these causes, and {before} without them."
 
 
 def _rms(case: Case, name: str) -> float:
@@ -166,7 +169,7 @@ def _failures(known: str, case: Case) -> list[str]:
             if case.diagnosis.bodies_fixed
             else f"Fitted to the rates, the base's mass has an error of {format_signed(float(off), 0)} %"
         )
-        + f", and the attitude error is {format_number(_rms(case, 'fitted'), 2)} degrees (rms)."
+        + f". With the fitted values {ANGLE} is {format_number(_rms(case, 'fitted'), 2)} degrees."
     ]
     missed = [cause for cause in analysis.CAUSES if cause not in verdict.causes]
     wrong = [cause for cause in verdict.causes if cause not in analysis.CAUSES]
@@ -282,8 +285,9 @@ def _statements(cases: Cases) -> list[Statement]:
         Statement(
             "The simulation without external actions is a rather strong assumption.",
             Finding.CONFIRMED,
-            f"Without the causes an angle is wrong by up to {format_number(last, 2)} degrees after "
-            f"{analysis.DURATION:g} s.",
+            f"Without the causes one Euler angle of the base differs by up to {format_number(last, 2)} degrees from "
+            f"the measured one at the end of a recording ({analysis.DURATION:g} s): the largest of all axes and "
+            "recordings.",
         ),
     ]
 

@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 from bayesid.design.pose_trajectory import CONTENT
 from bayesid.report import Document, figures
 from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, styled, wide_figure
-from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
+from bayesid.report.numbers import format_fixed, format_number, format_p_value, format_percent, format_vector
 from bayesid.report.verdict_record import Share
 from studies.common import mission
 from studies.common.ets7 import BIAS, START, TIP_RATE, TIP_SPEED, ets7
@@ -36,10 +36,14 @@ RISK = 0.05  # probability with which the counts of one stage are called wrong a
 NARROW = 0.05  # half width of an interval above which a count decides nothing
 
 
+def _p_value(share: Share) -> float:
+    """Return the probability of a count at least as unlikely as this one, where the region is right."""
+    return float(binomtest(share.count, share.total, CONTENT).pvalue)
+
+
 def _verdict(shares: list[Share]) -> Verdict:
     """Judge the counts of one stage together: each is tested with its part of `RISK`."""
-    values = [binomtest(share.count, share.total, CONTENT).pvalue for share in shares]
-    if min(values) < RISK / len(values):
+    if min(map(_p_value, shares)) < RISK / len(shares):
         return Verdict.FAIL
     widths = [high - low for low, high in (share.interval for share in shares)]
     return Verdict.PASS if max(widths) <= 2.0 * NARROW else Verdict.OPEN
@@ -51,7 +55,9 @@ def goals(result: Result) -> tuple[Goal, ...]:
     for row, flown in result.rows.items():
         for stage, title in enumerate(STAGES):
             shares = {text: flown.share(stage, *index) for index, text in REGIONS.items()}
+            least, part = min(map(_p_value, shares.values())), RISK / len(shares)
             reached = "; ".join(f"{text} {share}" for text, share in shares.items())
+            reached += f"; smallest p {format_p_value(least)}, at least {format_number(part, 2)} required"
             text = f"{format_percent(CONTENT)} regions contain the flown pose as often as stated, {title}, {ARMS[row]}"
             rows.append(Goal(text, reached, _verdict(list(shares.values()))))
     for row, flown in result.rows.items():

@@ -60,7 +60,9 @@ def _report(result: Result) -> Report[Result]:
         "manoeuvre determine, with which sensors, and what must be known?",
         answer=f"Joint torques determine the mass of the whole system to {torques}, and a known thrust to {thrust}. "
         f"Motion alone determines mass ratios but not their scale, which comes from the drawings (whole system: "
-        f"{motion}). The manoeuvre moves the tip {haste}.",
+        f"{motion}). Data: one recording of {result.duration:g} s at 2 Hz, with rates of {format_number(RATE)} rad/s, "
+        f"accelerations of {format_number(ACCEL)} m/s² and torques of {format_number(TORQUE)} N m (noise per sample); "
+        f"the manoeuvre moves the tip {haste}.",
         valid=f"the tip moves {haste}, joints follow their path, the load is rigid and noise is white; widths are "
         "linearised about the truth unless marked as sampled.",
         goals=_goals(result),
@@ -127,7 +129,7 @@ def _goals(result: Result) -> list[Goal]:
         )
     texts = (
         f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} "
-        "divided by their number) and three methods agree",
+        "over their number) and three methods agree",
         f"squared distances over drawn systems follow chi-square (Kolmogorov-Smirnov p at least {LEVEL:g})",
         f"distances beyond the {format_percent(TAIL)} quantile or below the {format_percent(1.0 - TAIL)} quantile: no "
         f"more than chance allows (two-sided p at least {LEVEL:g})",
@@ -137,7 +139,7 @@ def _goals(result: Result) -> list[Goal]:
     coverage, cases = result.coverage, result.cases
     agreed = [case for case in cases if not case.result.disagreements]
     distances = ", ".join(f"p = {format_number(case.p_value, 2)} ({case.title})" for case in cases)
-    sampled = f"{distances}; {len(agreed)} of {len(cases)} agree"
+    sampled = f"{distances}, each at least {_part(cases):g} required; {len(agreed)} of {len(cases)} agree"
     tail = f"{coverage.far} and {coverage.near} of {len(coverage.distances)}, p = {coverage.tail_p_value:.2f}"
     return [
         *goals,
@@ -147,9 +149,14 @@ def _goals(result: Result) -> list[Goal]:
     ]
 
 
+def _part(cases: Sequence[Sampled]) -> float:
+    """Return the part of `LEVEL` with which each sampled posterior is tested."""
+    return LEVEL / len(cases)
+
+
 def _well_sized(cases: Sequence[Sampled]) -> bool:
     """Return whether no posterior is too narrow or too wide, each tested with its part of `LEVEL`."""
-    return min(case.p_value for case in cases) >= LEVEL / len(cases)
+    return min(case.p_value for case in cases) >= _part(cases)
 
 
 def _negatives(document: Document, result: Result) -> None:
