@@ -19,8 +19,9 @@ from studies.common.provenance import processor
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
 
-# smallest wanted ratio of the time of each other simulator to that of an evaluation
-RIVALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
+# smallest wanted ratio of the time of each other simulator to that of an evaluation, compiled code first; a loop in
+# Python is a straw man and comes last
+RIVALS = {"MuJoCo rollouts in C": 100.0, "Pinocchio, step by step in Python": 2000.0}
 
 ERROR = 0.01  # largest wanted error of the integration [standard deviations of a sample]
 LINKS, WHITENING = 1.3, 1.5  # largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints
@@ -41,11 +42,12 @@ def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
     def over(value: Callable[[Benchmark], float]) -> Floats:
         return np.array([value(run) for run in runs])
 
+    fair, *loops = [
+        (f"time of {name} over that of one evaluation", np.array([run.speedups[name] for run in runs]), goal, True)
+        for name, goal in RIVALS.items()
+    ]
     return [
-        *(
-            (f"time of {name} over that of one evaluation", np.array([run.speedups[name] for run in runs]), goal, True)
-            for name, goal in RIVALS.items()
-        ),
+        fair,
         ("integration error [σ of a sample]", over(lambda run: run.error), ERROR, False),
         ("time with 60 links over that with 6", over(lambda run: run.links[60] / run.links[6]), LINKS, False),
         (
@@ -66,6 +68,7 @@ def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
             CHEAPER,
             True,
         ),
+        *loops,
     ]
 
 
@@ -101,9 +104,8 @@ def _report(result: Result) -> Report[Result]:
         subtitle="Cost of simulations and of effective samples",
         question="How much time does one simulation take compared with other simulators at the same accuracy, how does "
         "that depend on the problem, and how much time does an effective sample take?",
-        answer=f"One evaluation takes {_spread(1e6 * evaluations)} µs, {_spread(figures[0][1])} times less than "
-        f"Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C. It is "
-        f"that of ETS-VII with {EVALUATED}.",
+        answer=f"One evaluation takes {_spread(1e6 * evaluations)} µs, {_spread(ratios[0])} times less than MuJoCo's "
+        f"rollouts in C. It is that of ETS-VII with {EVALUATED}.",
         goals=[*goals_of(figures), *device_goals(result.device)],
         valid=f"run on {processor()}. Between runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
@@ -139,10 +141,11 @@ def _simulations(document: Document, result: Result) -> None:
             _spread(np.array([1e6 * run.rivals[k].seconds for run in runs])),
             _spread(np.array([run.speedups[rival.name] for run in runs])),
         ]
-        for k, rival in enumerate(runs[0].rivals)
+        for k, rival in sorted(enumerate(runs[0].rivals), key=lambda entry: list(RIVALS).index(entry[1].name))
     ]
-    rows.append(
-        ["one evaluation, as in the answer", _spread(np.array([1e6 * run.evaluation for run in runs])), "1 (1 to 1)"]
+    rows.insert(
+        0,
+        ["one evaluation, as in the answer", _spread(np.array([1e6 * run.evaluation for run in runs])), "1 (1 to 1)"],
     )
     cases: tuple[tuple[str, list[Mapping[Any, float]]], ...] = (
         ("links", [run.links for run in runs]),

@@ -48,13 +48,12 @@ def goals_of(cost: Cost) -> list[Goal]:
             Verdict.of(max(sampled.values()) <= SAMPLES if sampled else None),
         )
     )
-    goals.append(_nested(cost))
     for name, limit in COMMANDS.items():
         if limit is not None and name in cost.commands:
             walls = [run.wall for run in cost.commands[name][1:]]
             text = f"{name}, files to report, with cached compiled code: at most {limit:g} s"
             goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
-    return goals + _many_goals(cost.many) + _search_goals(cost.search)
+    return [*goals, *_many_goals(cost.many), *_search_goals(cost.search), _nested(cost)]
 
 
 def _many_goals(many: Mapping[str, list[Run]]) -> list[Goal]:
