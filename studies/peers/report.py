@@ -14,7 +14,7 @@ from bayesid._io.words import counted, joined
 from bayesid._math.arrays import Floats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, TRUTH, styled, wide_figure
-from bayesid.report.numbers import NO_VALUE, format_signed
+from bayesid.report.numbers import NO_VALUE, format_range, format_signed
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.monte_carlo import Workers, read_store, run_trials
@@ -228,7 +228,32 @@ def _answer(made: Made) -> str:
             f"With hidden wheel momentum, {_inside(errors_of_package)} of the package's stated 95 % intervals "
             f"contain the truth, against {others}."
         )
+    ratios_of_task = list(_task_ratios(made))
+    if ratios_of_task:
+        parts.append(
+            f"On the same task the package, which diagnoses and identifies, takes {format_range(ratios_of_task, 2)} "
+            f"times as long as a fit to a point with {joined(_rivals(made, False))}."
+        )
     return " ".join(parts) or "Nothing was run."
+
+
+def _task_ratios(made: Made) -> Iterator[float]:
+    """Yield the package's median time on the task over that of every other recipe, without and with wheels hidden."""
+    for hidden in (False, True):
+        times = _task_times(made, hidden)
+        of_package = times.pop(Recipe.BAYESID, None)
+        if of_package is not None:
+            yield from (of_package / time for time in times.values())
+
+
+def _task_times(made: Made, hidden: bool) -> dict[Recipe, float]:
+    """Return the median processor time of every recipe that was run [s]."""
+    by_recipe = {recipe: _recipes(made, recipe, hidden) for recipe in Recipe}
+    return {
+        recipe: float(np.median([result["seconds"] for result in results]))
+        for recipe, results in by_recipe.items()
+        if results
+    }
 
 
 def _setup() -> Setup:
@@ -291,12 +316,7 @@ def _slower(made: Made) -> list[str]:
     """Return sentences on the recipes that take less time than the package's on the same task."""
     sentences = []
     for hidden, words in ((False, "With nothing hidden"), (True, "With hidden wheel momentum")):
-        by_recipe = {recipe: _recipes(made, recipe, hidden) for recipe in Recipe}
-        times = {
-            recipe: float(np.median([result["seconds"] for result in results]))
-            for recipe, results in by_recipe.items()
-            if results
-        }
+        times = _task_times(made, hidden)
         of_package = times.pop(Recipe.BAYESID, None)
         faster = [
             f"{TITLES[recipe]} {time:.1f} s" for recipe, time in times.items() if of_package and time < of_package
