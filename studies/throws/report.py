@@ -11,10 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.progress import Progress, silent
+from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.report import Document, format_quantity
-from bayesid.report.figures.figure_style import styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
 from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
@@ -173,8 +174,15 @@ def _coverage(result: Result) -> Goal:
     count, total = covered_in_all(result)
     low, high = Share(count, total).interval
     text = f"95 % intervals of single throws contain the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
-    reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
+    reached = f"{100.0 * count / total:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %): {_covered(result)}"
     return Goal(text, reached, Verdict.between(low, high, LOW, HIGH))
+
+
+def _covered(result: Result) -> str:
+    """Return how many 95 % intervals of single throws hold the truth, of all bodies and of each."""
+    each = {body.name: body.covered(0.95) for body in result.extended.bodies.values()}
+    parts = joined(f"{count} of {total} for {name}" for name, (count, total) in each.items())
+    return f"{' of '.join(map(str, covered_in_all(result)))} ({parts})"
 
 
 def _reverse(result: Result) -> list[Goal]:
@@ -273,7 +281,6 @@ def _digits(value: float | np.floating) -> str:
 
 
 def _report(result: Result) -> Report[Result]:
-    count, total = covered_in_all(result)
     bodies = result.extended.bodies.values()
     errors = " and ".join(f"{body.mean_error:.2f} % ({body.name})" for body in bodies)
     stated = " and ".join(f"{_uncertain(body)} % ({body.name})" for body in bodies)
@@ -287,7 +294,7 @@ def _report(result: Result) -> Report[Result]:
         "intervals calibrated, and does the diagnosis identify what a model of a rigid body with its wheel lacks?",
         answer=f"Single throws differ from the stated principal moments by {errors} on average. The stated moments are "
         f"uncertain by {stated}; with a rigid body and its wheel alone the difference is {rigid}. Of the 95 % "
-        f"intervals, {count} of {total} contain the stated moments.{causes}",
+        f"intervals, {_covered(result)} contain the stated moments.{causes}",
         goals=goals_of(result),
         valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Four "
         "choices were made with these throws in view, so this is not a blind test.",
@@ -482,7 +489,12 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
                 sd = 100.0 * result.formal[:, index] / result.truth[index]
                 place = places + 0.2 * (index - 1)
                 axes.errorbar(
-                    place, result.errors[:, index], sd, fmt="os^"[index], markersize=3, linewidth=1, label=name
+                    *(place, result.errors[:, index], sd),
+                    fmt="os^"[index],
+                    color=COLOURS[index],
+                    markersize=3,
+                    linewidth=1,
+                    label=name,
                 )
             axes.set_xticks(places, [name[-3:] for name in result.throws])
             axes.set_title(f"{body}, {analysis.label} model")
@@ -503,11 +515,10 @@ def residual_figure(left: Mapping[str, Residual]) -> Figure:
         spectrum = np.array([residual.spectrum[:, c] for c in range(3, 6)])
         for edge in (residual.wheel[0], residual.wheel[2]):
             row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
-        for c in range(3, 6):
-            row[0].plot(residual.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
-            row[1].semilogy(
-                ORDERS, np.sqrt((residual.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
-            )
+        for c, colour in zip(range(3, 6), COLOURS, strict=False):
+            look = {"linewidth": 1, "color": colour, "label": CHANNELS[c][-1]}
+            row[0].plot(residual.frequencies[1:], 1e3 * spectrum[c - 3, 1:], **look)
+            row[1].semilogy(ORDERS, np.sqrt((residual.orders[:, :, c] ** 2).mean(axis=0)), **look)
         row[1].axvline(residual.turn[0], color="#888888", linewidth=0.8)
         row[0].set_title(body, loc="left")
         row[0].set_ylabel("[mm/s²]")
