@@ -343,11 +343,12 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
             special = name == LOG_LIKELIHOOD
             colour, width, order = (COLOURS[1], 1.4, 3) if special else ("0.6", 0.5, 2)
             axes.plot(POINTS, share - POINTS, color=colour, linewidth=width, zorder=order)
-        axes.set_title(f"{runs.case} ({count})", fontsize=7)
+        axes.set_title(runs.case)
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[-1]:
         axes.set_xlabel("rank")
+    figure.supylabel("share of ranks below − rank", fontsize=8)
     return figure
 
 
