@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,6 +20,7 @@ from studies.common import mission
 from studies.common.ets7 import TIP_SPEED
 from studies.common.flight import flown_along
 
+TITLE = 88  # number of characters of titles side by side that fill the page's width
 SIDE = 1.15  # longer side of the drawing as printed [in]
 
 # lengths that the scale may have [m]; the longest is drawn that is at most half as long as the drawing is wide
@@ -77,7 +79,7 @@ def manoeuvre_figure(motions: Mapping[str, Motion]) -> Figure:
         middle.plot(course.time, 1e3 * course.tip_speed, color=COLOURS[0])
         middle.axhline(1e3 * TIP_SPEED, color="black", linestyle=":", linewidth=0.8)
         bottom.plot(course.time, np.degrees(course.base_rotation), color=COLOURS[0])
-        top.set_title(title)
+        top.set_title(fill(title, TITLE // len(motions)))
         bottom.set_xlabel("time [s]")
     for axes, label in zip(panels[:, 0], ("joints [rad]", "tip speed [mm/s]", "base turned [deg]"), strict=True):
         axes.set_ylabel(label)

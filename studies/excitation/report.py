@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,13 @@ from matplotlib.figure import Figure
 from bayesid._math.arrays import Floats
 from bayesid.design import THOROUGH, Search, Store
 from bayesid.report import Document
-from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import AFTER, BAND, BEFORE, COLOURS, TRUTH, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from studies.common import mission
 from studies.common.ets7 import BIAS, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
-from studies.common.quantities import HEADINGS, LABELS
+from studies.common.quantities import HEADINGS, LABELS, MASS
+from studies.common.repeated_fits import Realised
 from studies.common.report_parts import add_number_table
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 from studies.excitation.search import FULL, QUICK, Contest, Crowd, Result, run
@@ -168,8 +170,9 @@ def _report(result: Result) -> Report[Result]:
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
         answer=f"The d-optimal manoeuvre gives {factors[HEADLINE]:.2f} times smaller standard deviations of the base "
-        f"(geometric mean) than the best condition number, with the {ARMS[HEADLINE]}. With the {ARMS[IDEAL]} they are "
-        f"{factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
+        f"(geometric mean) than the best condition number, with the {ARMS[HEADLINE]}. That of the mass alone, whose "
+        f"scale comes from the arm, is {_of_mass(contest):.2f} times smaller. With the {ARMS[IDEAL]} the geometric "
+        f"mean is {factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
         "gradient acts.",
@@ -191,7 +194,8 @@ def _report(result: Result) -> Report[Result]:
             unknown="The base (mass uncertain by a factor of e², 1 sigma), the rate at the start, the accelerometer's "
             f"bias within {format_number(BIAS)} m/s², and the links, which are marginalised.",
             replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
-            f"criterion{_crowds(result)}; {_flights(result)}, each with a separate draw of arm, bias and noise.",
+            f"criterion{_crowds(result)}; {_flights(result)}, each with a separate draw of arm, bias and noise. "
+            "Times of searches are in the report on cost.",
         ),
         outline=robot_outline(ets7(), START),
         sections=[_evidence, _calibration],
@@ -210,6 +214,12 @@ def _starts(result: Result) -> str:
         f"the d-optimal search used {starts} random starts, that by condition number {usual} and the best manoeuvres "
         "of the other criteria"
     )
+
+
+def _of_mass(contest: Contest) -> float:
+    """Return how many times smaller the sd of the mass is by d-optimality than by the condition number."""
+    predicted = contest.predicted[HEADLINE]
+    return float(predicted["condition-number"].sd[MASS] / predicted["d-optimal"].sd[MASS])
 
 
 def _crowds(result: Result) -> str:
@@ -295,8 +305,10 @@ def _calibration(document: Document, result: Result) -> None:
         "the last step.",
     )
     document.figure(
-        _realised_figure(result),
-        "Root mean square error of every parameter over its predicted sd, with standard errors. The band is ± 5 %.",
+        _realised_figure(result.realised),
+        "Root mean square error of each of the ten parameters over its predicted sd, and their geometric mean, by "
+        f"manoeuvre. The grey band is ± {format_percent(WITHIN)}; the lines are two standard errors of one ratio about "
+        "1.",
     )
 
 
@@ -378,7 +390,7 @@ def _relative(name: str, crowd: Crowd, costs: Floats) -> Floats:
 
 @styled
 def _crowd_figure(result: Result) -> Figure:
-    figure = wide_figure(1.7)
+    figure = wide_figure(1.9)
     panels = figure.subplots(1, len(result.crowds))
     for axes, (name, crowd) in zip(panels, result.crowds.items(), strict=True):
         ordered, total = np.sort(crowd.costs), len(crowd.costs)
@@ -394,8 +406,8 @@ def _crowd_figure(result: Result) -> Figure:
         axes.set(xscale="log", xlabel="number of starts n, or rank", title=TITLES[name])
         axes.set_xticks([1, 3, 10, 30, 100], ["1", "3", "10", "30", "100"])
         axes.minorticks_off()
-    panels[0].set_ylabel("over the best first descent")
-    panels[-1].legend()
+    panels[0].set_ylabel("over the best first")
+    shared_legend(figure, panels[0], 3)
     return figure
 
 
@@ -414,18 +426,19 @@ def _cloud_figure(result: Result) -> Figure:
 
 
 @styled
-def _realised_figure(result: Result) -> Figure:
-    figure = wide_figure(1.7)
+def _realised_figure(realised: Mapping[str, Realised]) -> Figure:
+    """Draw the ten ratios of every manoeuvre on its line, and their geometric mean."""
+    figure = wide_figure(0.55 + 0.19 * len(realised))
     axes = figure.subplots()
-    axes.axhspan(1.0 - WITHIN, 1.0 + WITHIN, color="#e8e8e8", linewidth=0.0)
-    place = np.arange(10)
-    for index, (name, realised) in enumerate(result.realised.items()):
-        moved = place + 0.1 * (index - 0.5 * (len(result.realised) - 1))
-        look = {"fmt": "o", "color": COLOURS[index], "markersize": 4, "capsize": 2}
-        axes.errorbar(moved, realised.rms, realised.rms_error, label=TITLES[name], **look)  # type: ignore[arg-type]
-    axes.set_xticks(place, LABELS)
-    axes.set_ylabel("realised / predicted")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    axes.axvspan(1.0 - WITHIN, 1.0 + WITHIN, **BAND)
+    for row, each in enumerate(realised.values()):
+        reach = 2.0 * each.rms_error
+        axes.plot([1.0 - reach, 1.0 + reach], [row, row], color=TRUTH, label=None if row else "± 2 standard errors")
+        axes.plot(each.rms, np.full(10, row), "o", color=AFTER, markersize=3.5, label=None if row else "parameter")
+        axes.plot(each.ratio, row, "|", color=BEFORE, markersize=11, mew=2, label=None if row else "geometric mean")
+    axes.set_yticks(range(len(realised)), [TITLES[name] for name in realised])
+    axes.set(xlabel="realised / predicted sd", ylim=(len(realised) - 0.5, -0.5))
+    shared_legend(figure, axes, 3)
     return figure
 
 
