@@ -249,7 +249,7 @@ def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], n
     """Draw the samples and the projection of the ellipsoid onto a plane."""
     covariance = region.covariance[np.ix_(plane, plane)]
     outline = ellipse_outline(covariance, region.reach) + region.mean[list(plane)][:, None]
-    axes.plot(draws[:, 0], draws[:, 1], ".", color=colour, markersize=1.5, alpha=0.35, markeredgewidth=0.0)
+    axes.plot(draws[:, 0], draws[:, 1], ".", color=colour, markersize=3.0, alpha=0.6, markeredgewidth=0.0)
     axes.plot(outline[0], outline[1], label=name, color=colour)
 
 
