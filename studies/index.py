@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from bayesid._io.files import write_text
-from studies.common.study import Verdict
-from studies.validation import BESIDE, SUBJECTS
+from studies.common.study import NOT_FULL, Verdict
+from studies.validation import BESIDE
 
 HEAD = """# Reports
 
@@ -33,11 +32,9 @@ def index_text(folder: Path) -> str:
     reports = sorted(folder.glob("*.pdf"))
     summaries = [(file, json.loads(file.with_suffix(".json").read_text())) for file in reports if _kept(file)]
     others = [f"- [{file.stem}]({file.name})" for file in reports if not _kept(file) and file.stem not in BESIDE]
-    untested = [asdict(goal) for subject in SUBJECTS for goal in subject.untested]
-    parts = [HEAD, *_totals([summary["goals"] for _, summary in summaries], untested)]
+    parts = [HEAD, *_totals([summary["goals"] for _, summary in summaries])]
     for file, summary in summaries:
         parts += ["", *_entry(file, summary)]
-    parts += ["", "## Goals without a study", "", *_table(untested)]
     return "\n".join([*parts, *([OTHERS, *others] if others else []), ""])
 
 
@@ -52,8 +49,8 @@ def _counts(goals: Iterable[Mapping[str, Any]]) -> str:
     )
 
 
-def _totals(judged: Sequence[Sequence[Mapping[str, Any]]], untested: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    goals = [*chain.from_iterable(judged), *untested]
+def _totals(judged: Iterable[Sequence[Mapping[str, Any]]]) -> Iterator[str]:
+    goals = [*chain.from_iterable(judged)]
     yield f"All {len(goals)} goals: {_counts(goals)}."
 
 
@@ -64,8 +61,8 @@ def _entry(file: Path, summary: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield f"**{summary['answer']}**"
     yield ""
-    run = "full run" if summary["full"] else "not run in full"
-    yield f"Valid when {summary['valid']} {run.capitalize()}. Goals: {_counts(summary['goals'])}."
+    caution = "" if summary["full"] else f"{NOT_FULL} "
+    yield f"Valid when {summary['valid']} {caution}Goals: {_counts(summary['goals'])}."
     yield ""
     yield from _table(summary["goals"])
 
