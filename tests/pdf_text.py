@@ -37,5 +37,12 @@ class PdfText:
         return "".join(cells) in self
 
 
+def links_of(file: Path) -> set[str]:
+    """Return the targets of all links of a PDF to files and pages of the web."""
+    pages = PdfReader(file).pages
+    actions = (entry.get_object()["/A"] for page in pages for entry in page.get("/Annots", []))
+    return {action["/URI"] for action in actions if "/URI" in action}
+
+
 def _bare(text: str) -> str:
     return BREAKABLE.sub("", text)

@@ -10,14 +10,13 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
-from pypdf import PdfReader
 
 from bayesid.report import Document
-from bayesid.report.document import fitted_height
+from bayesid.report.document import _least_filled, fitted_height
 from bayesid.report.figures.figure_style import styled, wide_figure
 from studies.common.provenance import study_origin
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
-from tests.pdf_text import PdfText
+from tests.pdf_text import PdfText, links_of
 from tests.report_rules import badly_written, broken_rules
 
 GOALS = (
@@ -55,12 +54,6 @@ def weighed(result: float) -> Report[float]:
 STUDY = Study("weighing", "Weigh a box.", run=lambda seed, progress: float(seed), report=weighed, seed=4)
 
 
-def links(file: Path) -> set[str]:
-    """Return the targets of all links of a PDF."""
-    pages = PdfReader(file).pages
-    return {entry.get_object()["/A"]["/URI"] for page in pages for entry in page.get("/Annots", [])}
-
-
 def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     origin = study_origin("weighing", argparse.Namespace(full=True, seed=4, output=tmp_path))
     STUDY.write(3.1, tmp_path / "weighing.pdf", origin)
@@ -83,7 +76,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     kept = json.loads((tmp_path / "weighing.json").read_text())
     assert kept["answer"] == "It weighs 3.1 kg."
     assert kept["origin"] == origin
-    assert links(tmp_path / "weighing.pdf") == {"excitation.pdf", "weighing-all.csv"}
+    assert links_of(tmp_path / "weighing.pdf") == {"excitation.pdf", "weighing-all.csv"}
     assert [goal["verdict"] for goal in kept["goals"]] == ["PASS", "FAIL", "NOT TESTED"]
 
     with (tmp_path / "weighing-all.csv").open(newline="") as stream:
@@ -187,3 +180,19 @@ def test_labels_can_be_read_in_print():
         return [float(mpl.rcParams[key]) for key in keys]
 
     assert min(sizes()) >= 8.0
+
+
+def test_a_page_is_filled_by_what_runs_on_to_the_next_and_not_by_what_moves_there():
+    whole, flowing = [(1, 0.4), (2, 0.3), (2, 0.9)], [(1, 0.4), (2, 0.3), (3, 0.8)]
+    assert _least_filled(whole, [True, False, False]) == 0.4
+    assert _least_filled(flowing, [True, True, True]) == 0.8
+    assert _least_filled([(1, 0.1)], [True]) == 1.0
+
+
+def test_options_and_units_are_not_torn_at_line_ends(tmp_path: Path):
+    document = Document("Lines")
+    document.paragraph("python -m studies.weighing --full --seed 4 with 1 × 10⁻⁵ m/s². " * 40)
+    document.write(tmp_path / "lines.pdf")
+    lines = PdfText.read(tmp_path / "lines.pdf").pages[0].splitlines()
+    assert len(lines) > 20
+    assert not any(line.rstrip().endswith(("-", "m/", "×", " 1")) for line in lines)

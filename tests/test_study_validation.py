@@ -7,7 +7,7 @@ import pytest
 
 from studies.common.study import NOT_FULL, Verdict
 from studies.validation import Severity, judged, severity, write_validation
-from tests.pdf_text import PdfText
+from tests.pdf_text import PdfText, links_of
 from tests.report_rules import broken_rules
 
 REPORTS = Path(__file__).resolve().parents[1] / "reports"
@@ -25,6 +25,9 @@ def test_every_goal_of_every_summary_is_in_the_report():
     for summary in summaries:
         assert summary["answer"] in text, "run python -m studies.validation"
     assert broken_rules(REPORTS / "validation.pdf", full=False) == []
+    links = links_of(REPORTS / "validation.pdf")
+    assert {f"{item.study}.pdf" for item in found} < links
+    assert all((REPORTS / link).is_file() for link in links)
 
 
 def test_misses_come_first_and_unknown_studies_are_not_lost(tmp_path):
