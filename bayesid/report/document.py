@@ -1,4 +1,4 @@
-"""A PDF document, built piece by piece and set by Typst with the fonts that Typst brings.
+"""A PDF document, built piece by piece and set by Typst with the fonts that Typst and, for figures, matplotlib bring.
 
 Text that callers give is never read as markup: it reaches Typst as string literals.
 """
@@ -47,6 +47,9 @@ HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3
 FILLED = 0.7  # fraction of its text's height to which every page is then filled, where one of the factors permits
 
 LOOK = "document.typ"  # file beside this one that holds the look of every report
+
+FONTS = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
+"""Folder of the letters of figures, whose text remains text in the PDF."""
 
 _MARK = """
 #context {
@@ -207,7 +210,8 @@ class Document:
             factor = self._filling_height(source) if filled else 1.0
             drawn = self._drawn if factor == 1.0 else [_svg(fig, factor) for fig in self._figures]
             _write_all(folder, drawn)
-            pdf = typst.compile(str(source), root=name, format="pdf", sys_inputs={"height": str(factor)})
+            inputs = {"height": str(factor)}
+            pdf = typst.compile(str(source), root=name, format="pdf", sys_inputs=inputs, font_paths=FONTS)
         with complete_file(path) as part:
             part.write_bytes(pdf)
 
@@ -330,7 +334,7 @@ def _svg(fig: Figure, factor: float = 1.0) -> bytes:
         fig.set_layout_engine("none")
     fig.set_dpi(RESOLUTION)
     content = io.BytesIO()
-    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "bayesid"}):
         # savefig would draw the figure twice, the first time to find its layout
         FigureCanvasSVG(fig).print_svg(content, metadata={"Date": None})
     fig.set_size_inches(width, height)
