@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bayesid.diagnosis import Status
-from bayesid.report.verdict_record import Share, record_sentence, shipped_record
+from bayesid.report.verdict_record import Record, Share, record_sentence, shipped_record
 from studies.blind_injections import STUDY, Campaign, Trial, plan, run
 from studies.blind_injections.goals import (
     _correlation,
@@ -197,17 +197,29 @@ def committed():
 
 def test_the_record_that_is_shipped_is_that_of_the_committed_trials(committed):
     record = record_of(committed)
-    assert {name: asdict(share) for name, share in shipped_record().items()} == record
-    assert sum(record[status.value]["total"] for status in Status) == len(committed) > 100
+    assert asdict(shipped_record()) == record
+    totals = [record[where][status.value]["total"] for where in ("inside", "outside") for status in Status]
+    assert sum(totals) == len(committed) > 100
+    hidden_outside = sum(trial.kind == "unknown" for trial in committed)
+    assert record["outside"]["misnamed"]["total"] == hidden_outside > 10
 
 
-def test_a_verdict_is_shown_with_its_record(monkeypatch):
-    shares = {status.value: Share(9, 10) for status in Status} | {"unresolved": Share(0, 0)}
-    shares |= {"quiet": Share(20, 20), "loud": Share(7, 8)}
-    monkeypatch.setattr("bayesid.report.verdict_record.shipped_record", lambda: shares)
-    assert "9 of 10 (55 to 100 %) named only injected causes" in record_sentence(Status.EXPLAINED)
-    assert "20 of 20 (83 to 100 %) raised no alarm" in record_sentence(Status.ADEQUATE)
-    assert "7 of 8 (47 to 100 %) raised one" in record_sentence(Status.ADEQUATE)
+def test_a_verdict_is_shown_with_its_record_inside_and_outside_the_catalogue(monkeypatch):
+    inside = {status.value: Share(9, 10) for status in Status} | {"unresolved": Share(0, 0)}
+    inside |= {"quiet": Share(20, 20), "loud": Share(7, 8), "misnamed": Share(1, 40)}
+    outside = {status.value: Share(2, 3) for status in Status} | {"unresolved": Share(0, 0), "loud": Share(4, 5)}
+    record = Record(inside, outside | {"misnamed": Share(1, 6)})
+    monkeypatch.setattr("bayesid.report.verdict_record.shipped_record", lambda: record)
+    explained = record_sentence(Status.EXPLAINED)
+    assert "inside the catalogue, 9 of 10 (55 to 100 %) verdicts that explained the data named only" in explained
+    assert "outside it, 1 of 6 (0 to 64 %) injections were wrongly explained" in explained
+    assert "outside it, 2 of 3 (9 to 99 %) listed something unknown" in record_sentence(Status.AMBIGUOUS)
+    unknown = record_sentence(Status.UNKNOWN)
+    assert "11 of 13 (55 to 98 %) verdicts of an unknown cause followed" in unknown
+    assert "2 of the 6 injections outside it" in unknown
+    adequate = record_sentence(Status.ADEQUATE)
+    assert "20 of 20 (83 to 100 %) raised no alarm" in adequate
+    assert "7 of 8 (47 to 100 %) inside the catalogue and 4 of 5 (28 to 99 %) outside it raised one" in adequate
     assert record_sentence(Status.UNRESOLVED) is None
 
 

@@ -17,7 +17,8 @@ from bayesid.diagnosis import Status
 __all__ = ["COUNTS", "Share", "record_sentence", "shipped_record"]
 
 COUNTS = "verdict_record.json"
-"""Name of the file of counts: those of each status, and those of data sets with nothing and with much hidden."""
+"""Name of the file of counts, apart for trials inside and outside the catalogue: those of each status, of data sets with
+nothing hidden ("quiet") and with much hidden ("loud"), and of hidden causes that were explained by others ("misnamed")."""
 
 
 @dataclass(frozen=True)
@@ -38,31 +39,63 @@ class Share:
         found = binomtest(self.count, self.total).proportion_ci(0.95)
         return float(found.low), float(found.high)
 
+    def __add__(self, other: Share) -> Share:
+        return Share(self.count + other.count, self.total + other.total)
+
     def __str__(self) -> str:
+        if not self.total:
+            return "none"
         low, high = (round(100.0 * end) for end in self.interval)
         return f"{self.count} of {self.total} ({low} to {high} %)"
 
 
+@dataclass(frozen=True)
+class Record:
+    """Counts of the trials.
+
+    Attributes
+    ----------
+    inside, outside : dict of str to Share
+        Trials with nothing or causes of the catalogue hidden, and with an effect outside it.
+    """
+
+    inside: dict[str, Share]
+    outside: dict[str, Share]
+
+
 @cache
-def shipped_record() -> dict[str, Share]:
+def shipped_record() -> Record:
     """Return the counts that come with this version."""
     text = (files("bayesid.report") / COUNTS).read_text(encoding="utf-8")
-    return {name: Share(**share) for name, share in json.loads(text).items()}
+    counts = json.loads(text)
+    return Record(
+        *({name: Share(**share) for name, share in counts[where].items()} for where in ("inside", "outside"))
+    )
 
 
 def record_sentence(status: Status) -> str | None:
-    """Return how often verdicts of a status were right in the trials, None where there was no such verdict."""
+    """Return how often verdicts of a status were right in the trials, None where there was no such verdict.
+
+    Trials with a cause of the catalogue and with one outside it are reported apart.
+    """
     record = shipped_record()
-    share = record.get(status.value)
-    if share is None or not share.total:
+    inside, outside = record.inside, record.outside
+    here, there = inside[status.value], outside[status.value]
+    if not (here + there).total:
         return None
+    misnamed = f"; outside it, {outside['misnamed']} injections were wrongly explained by causes of the catalogue"
     said = {
-        Status.EXPLAINED: f"of the verdicts that explained the data, {share} named only injected causes",
-        Status.PARTLY_EXPLAINED: f"of the verdicts that explained part of the data, {share} named only injected causes",
-        Status.AMBIGUOUS: f"of the ambiguous verdicts, {share} listed the injected causes among their alternatives",
-        Status.UNKNOWN: f"of the verdicts of an unknown cause, {share} followed an injection outside the catalogue",
-        Status.UNRESOLVED: f"of the unresolved verdicts, {share} followed an injection",
-        Status.ADEQUATE: f"without an injection, {record['quiet']} raised no alarm; with an injection of at least "
-        f"seven standard deviations, {record['loud']} raised one",
+        Status.EXPLAINED: f"inside the catalogue, {here} verdicts that explained the data named only injected causes"
+        f"{misnamed}",
+        Status.PARTLY_EXPLAINED: f"inside the catalogue, {here} verdicts that explained part of the data named only "
+        f"injected causes{misnamed}",
+        Status.AMBIGUOUS: f"inside the catalogue, {here} ambiguous verdicts listed the injected causes among their "
+        f"alternatives; outside it, {there} listed something unknown",
+        Status.UNKNOWN: f"{here + there} verdicts of an unknown cause followed an injection outside the catalogue; "
+        f"{there.count} of the {outside['misnamed'].total} injections outside it led to such a verdict",
+        Status.UNRESOLVED: f"{here + there} unresolved verdicts followed an injection, {there.total} of them outside "
+        "the catalogue",
+        Status.ADEQUATE: f"without an injection, {inside['quiet']} raised no alarm; of injections of at least seven "
+        f"standard deviations, {inside['loud']} inside the catalogue and {outside['loud']} outside it raised one",
     }
-    return f"In blind trials of this method with known answers: {said[status]}; the 95 % interval is in brackets."
+    return f"In blind trials of this method (95 % intervals in brackets): {said[status]}."

@@ -192,14 +192,23 @@ RIGHT: dict[Status, Callable[[Trial], bool]] = {
 }
 
 
-def record_of(trials: Sequence[Trial]) -> dict[str, dict[str, int]]:
-    """Return the counts by status, of nulls without alarm ("quiet"), and of clear effects with one ("loud")."""
+def record_of(trials: Sequence[Trial]) -> dict[str, dict[str, dict[str, int]]]:
+    """Return the counts that the package ships, apart for trials inside and outside the catalogue (`Record`)."""
+    outside = [trial for trial in trials if trial.kind == "unknown"]
+    inside = [trial for trial in trials if trial.kind != "unknown"]
+    return {"inside": _counts(inside), "outside": _counts(outside)}
+
+
+def _counts(trials: Sequence[Trial]) -> dict[str, dict[str, int]]:
+    """Return the counts by status, of nulls without alarm, of clear effects with one, and of wrong explanations."""
     shares = {}
     for status, right in RIGHT.items():
         said = [trial for trial in trials if trial.status == status.value]
         shares[status.value] = Share(sum(map(right, said)), len(said))
     nulls = [trial for trial in trials if trial.kind == "adequate"]
-    clear = [t for t in trials if t.kind != "adequate" and (t.signal_to_noise or 0.0) >= CLEAR]
+    hidden = [trial for trial in trials if trial.kind != "adequate"]
+    clear = [trial for trial in hidden if (trial.signal_to_noise or 0.0) >= CLEAR]
     shares["quiet"] = Share(sum(not trial.alarmed for trial in nulls), len(nulls))
     shares["loud"] = Share(sum(trial.alarmed for trial in clear), len(clear))
+    shares["misnamed"] = Share(sum(map(wrongly_explained, hidden)), len(hidden))
     return {name: asdict(share) for name, share in shares.items()}
