@@ -28,7 +28,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 
-__all__ = ["BasePredictor", "Prediction", "predict"]
+__all__ = ["BasePredictor", "Prediction", "base_and_tip", "predict"]
 
 # sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]
 ATTITUDE = Sensor(SensorKind.ATTITUDE, White(1e-6))
@@ -146,13 +146,28 @@ class BasePredictor:
         count = len(self.time)
         com = np.stack([np.asarray(instant.body.com)[0, :count] for instant in instants])
         turn = np.stack([np.asarray(instant.attitude)[0, :count] for instant in instants])
-        place = np.einsum("ntij,ntj->nti", turn, com)
-        base = place[:, :1] - place
-        tip = base + np.einsum("ntij,tj->nti", turn, self._tip[:, :3, 3])
+        base, tip = base_and_tip(turn, com, self._tip[:, :3, 3])
         return (
             PoseTrajectory(self.time, base, _quaternions(turn)),
             PoseTrajectory(self.time, tip, _quaternions(turn @ self._tip[:, :3, :3])),
         )
+
+
+def base_and_tip(turn: Floats, com: Floats, tip: Floats) -> tuple[Floats, Floats]:
+    """Return the positions of base and end-effector from the start of the base, orbit axes, without external force.
+
+    Parameters
+    ----------
+    turn : (..., T, 3, 3) array
+        Attitude of the base, base to orbit axes.
+    com : (..., T, 3) array
+        Centre of mass of the robot, base axes [m].
+    tip : (T, 3) array
+        End-effector, base axes [m].
+    """
+    place = np.einsum("...ij,...j->...i", turn, com)
+    base = place[..., :1, :] - place
+    return base, base + np.einsum("...ij,...j->...i", turn, tip)
 
 
 def predict(

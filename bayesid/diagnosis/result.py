@@ -29,6 +29,7 @@ from bayesid.diagnosis.outcome.gain import (
     strongest_recording,
 )
 from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_pairs
+from bayesid.diagnosis.outcome.motion_change import MotionChange, motion_change
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.search.model_search import ModelSearch
@@ -229,6 +230,11 @@ class Diagnosis(ShortForm):
         """Errors of the simulation of every sensor, before and after."""
         return simulation_errors(self.before, self.after, self.gain)
 
+    @cached_property
+    def motion_change(self) -> MotionChange | None:
+        """How far the motions predicted with and without the named causes are apart; None where none is named."""
+        return motion_change(self.before, self.after) if self.named else None
+
     @property
     def strongest_recording(self) -> int:
         """Recording whose chi-square decreases most by the named causes, or is largest where none is named."""
@@ -346,6 +352,7 @@ class Diagnosis(ShortForm):
             "gain": _gain(self),
             "inertial_parameters": {change.name: change.to_dict() for change in self.parameter_changes},
             "simulation_error": {error.kind.value: error.to_dict() for error in self.simulation_errors},
+            "motion_change": None if self.motion_change is None else self.motion_change.to_dict(),
             "strongest_recording": self.recordings[self.strongest_recording],
             "vectors": {name: vector.to_dict() for name in verdict.causes if (vector := vector_size(self.after, name))},
             "inseparable": [pair.to_dict() for pair in self.inseparable_pairs[:PAIRS]],
