@@ -51,6 +51,12 @@ LOOK = "document.typ"  # file beside this one that holds the look of every repor
 FONTS = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
 """Folder of the letters of figures, whose text remains text in the PDF."""
 
+QUANTITY = re.compile(
+    r"(?:(?:\b[xyz]|\w+\.\w+) )?(?:[<>] )?\(?[−+]?\d[\d.]*(?: ± [\d.]+\)?)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+    r"(?: (?:%|(?:N|A|kg|mm|m|s|rad|Hz)[²³]?(?:/\w+[²³]?)?)(?![\w.]\w))*"
+)
+"""A number with its axis, its uncertainty, its power of ten and its unit, in which no line is broken."""
+
 _MARK = """
 #context {
   let at = here().position()
@@ -259,8 +265,8 @@ def _least_filled(ends: Sequence[tuple[int, float]], flows: Sequence[bool]) -> f
 
 
 def literal(text: str) -> str:
-    """Return plain text as a string literal of Typst, with no line broken in ``5 %`` and ``2 × 10⁻⁶``."""
-    clean = re.sub(r"(?<=\d) (?=[%×])|(?<=\d ×) (?=10)", "\u00a0", text.encode("utf-8", "replace").decode("utf-8"))
+    """Return plain text as a string literal of Typst, with no line broken within a quantity (`QUANTITY`)."""
+    clean = QUANTITY.sub(lambda found: found[0].replace(" ", "\u00a0"), text.encode("utf-8", "replace").decode("utf-8"))
     escaped = clean.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return '"' + re.sub(r"[\x00-\x09\x0b-\x1f\x7f]", " ", escaped) + '"'
 

@@ -247,7 +247,7 @@ def agreement_sentences(result: Identification) -> list[str]:
     )
     weights = (
         f"Importance sampling: {evidence.evaluations} draws, {evidence.effective_samples:.0f} effective, Pareto k-hat "
-        f"{evidence.pareto_k:.2f} ({'trusted' if evidence.trusted else 'not trusted'}; the limit is 0.7). "
+        f"{format_fixed(evidence.pareto_k, 2)} ({'trusted' if evidence.trusted else 'not trusted'}; the limit is 0.7). "
         f"Log evidence {format_quantity(evidence.value, evidence.error)}; the Laplace approximation gives "
         f"{format_number(optimum.log_evidence(result.posterior), 8)}."
     )

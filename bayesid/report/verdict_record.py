@@ -17,8 +17,8 @@ from bayesid.diagnosis import Status
 __all__ = ["COUNTS", "Share", "record_sentence", "shipped_record"]
 
 COUNTS = "verdict_record.json"
-"""Name of the file of counts, apart for trials inside and outside the catalogue: those of each status, of data sets with
-nothing hidden ("quiet") and with much hidden ("loud"), and of hidden causes that were explained by others ("misnamed")."""
+"""Name of the file of counts, apart for trials inside and outside the catalogue: those of each status, of data sets
+with nothing hidden ("quiet") and with much hidden ("loud"), and of hidden causes explained by others ("misnamed")."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,7 @@ def shipped_record() -> Record:
     """Return the counts that come with this version."""
     text = (files("bayesid.report") / COUNTS).read_text(encoding="utf-8")
     counts = json.loads(text)
-    return Record(
-        *({name: Share(**share) for name, share in counts[where].items()} for where in ("inside", "outside"))
-    )
+    return Record(*({name: Share(**share) for name, share in counts[where].items()} for where in ("inside", "outside")))
 
 
 def record_sentence(status: Status) -> str | None:
