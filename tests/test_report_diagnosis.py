@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
 
 import bayesid.diagnosis
 from bayesid._io.errors import InputError
@@ -35,22 +36,32 @@ from bayesid.diagnosis.outcome.cause_sizes import VectorSize, vector_size
 from bayesid.diagnosis.outcome.disturbance import torque_correlations
 from bayesid.diagnosis.outcome.gain import strongest_recording
 from bayesid.diagnosis.outcome.inseparable_causes import cause_cosines
+from bayesid.diagnosis.outcome.motion_change import motion_change
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
+from bayesid.inference.perturbed_posterior import trace
 from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.residual_view import ResidualView
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report.diagnosis import diagnosis_sentences as sentences
-from bayesid.report.diagnosis.appendix import GLOSSARY, bound_rows, candidate_rows, sensitivity_rows
+from bayesid.report.diagnosis.appendix import (
+    GLOSSARY,
+    bound_rows,
+    candidate_rows,
+    robustness_sentence,
+    sensitivity_rows,
+)
 from bayesid.report.diagnosis.cause_words import amplitude_text, size_text, vector_text
 from bayesid.report.diagnosis.causes_page import cause_rows, set_rows
-from bayesid.report.diagnosis.consequences_page import change_rows, correlation_rows, error_rows, most_moved
+from bayesid.report.diagnosis.consequences_page import change_rows, correlation_rows, most_moved
 from bayesid.report.diagnosis.decision_page import conditions_text, decision_entries, probability_rows
 from bayesid.report.diagnosis.diagnosis_sentences import ANYTHING, action_sentence, advice, advice_sentences
 from bayesid.report.diagnosis.evidence_page import gain_rows
 from bayesid.report.diagnosis.limits_page import computation_sentence, method_sentences, pair_rows, unseen_rows
-from bayesid.report.figures.diagnosis_figures import cause_marks, moved_axis
+from bayesid.report.diagnosis.sampled_page import sampled_sentence
+from bayesid.report.figures.diagnosis_figures import moved_axis
 from bayesid.report.figures.residual_figures import NOISE_BAND
+from bayesid.report.figures.robot_with_causes import cause_marks, view_of
 from bayesid.report.model_assumptions import joint_rows, model_sentences
 from bayesid.report.numbers import format_number, format_probability, format_quantity, format_text
 from bayesid.robot.kinematics import kinematics
@@ -568,7 +579,6 @@ def test_the_errors_are_in_the_units_of_the_sensors(biased):
         rms = [biased.gain.before.rms[f"{item.kind.value}.{axis}"] for axis in "xyz"]
         assert item.before == pytest.approx(SIGMA * np.linalg.norm(rms))
     assert accel.before > 1.5 * accel.after
-    assert error_rows([accel])[0][:2] == ["accel", "m/s²"]
 
 
 def test_the_strongest_recording_is_the_one_that_gains_most(biased):
@@ -629,12 +639,14 @@ def test_the_sensitivity_says_under_which_choices_the_verdict_is_another(biased)
     first = next(iter(biased.sensitivity.others))
     other = ProbableVerdict(Status.AMBIGUOUS, ("accel-bias",), {}, ((),))
     changed = replace(biased.sensitivity, others={**biased.sensitivity.others, first: other})
-    rows = {row[0]: row[1:] for row in sensitivity_rows(replace(biased, sensitivity=changed))}
-    assert rows["as chosen"] == ["explained: accel-bias", ""]
-    assert rows.pop(first) == ["ambiguous: accel-bias or nothing", "yes"]
-    del rows["as chosen"]
-    assert len(rows) == len(biased.sensitivity.others) - 1
-    assert all(row == ["explained: accel-bias", "no"] for row in rows.values())
+    result = replace(biased, sensitivity=changed)
+    assert sensitivity_rows(result) == [[first, "ambiguous: accel-bias or nothing"]]
+    said, others = robustness_sentence(result), list(biased.sensitivity.others)
+    assert said.startswith(
+        f"The verdict would change under 1 of {len(others)} other choices. It remains the same with "
+    )
+    assert [name for name in others if name in said] == others[1:]
+    assert sensitivity_rows(biased) == []
 
 
 def test_the_bounds_have_their_reasons(biased):
@@ -651,6 +663,8 @@ def test_the_method_states_false_alarms_the_prior_and_the_seed(biased):
     prior = biased.probabilities.prior
     assert f"with a probability of {prior.one_more:g}" in said
     assert "Seed of all random numbers: 3." in said
+    listed = {row.name for row in biased.candidates}
+    assert all((name in said) is (name not in listed) for name in biased.probabilities.causes)
     assert f"{sum(biased.seconds.values()):.1f} s until the verdict" in computation_sentence(biased)
 
 
@@ -671,7 +685,7 @@ def test_the_cause_is_drawn_where_it_acts(biased):
     (mark,) = cause_marks(biased.after, pose)
     assert mark.label == "accel-bias"
     np.testing.assert_allclose(mark.point, POINT)  # where the accelerometer is
-    assert mark.direction[0] > 0.95
+    assert mark.vector.direction[0] > 0.95
     robot_panel, before, after = figures.plot_verdict(biased, 0).axes
     assert "accel-bias" in [text.get_text() for text in robot_panel.texts]
     assert (before.get_title(), after.get_title()) == ("acceleration x, before", "acceleration x, after")
@@ -683,7 +697,7 @@ def test_the_cause_is_drawn_where_it_acts(biased):
 
 def test_no_cause_is_drawn_where_none_is_named(clean):
     robot_panel, residual = figures.plot_verdict(clean, 0).axes
-    assert not list(robot_panel.texts)
+    assert {text.get_text() for text in robot_panel.texts} - {"x", "y", "z"} == {"0.5 m"}  # axes and their scale alone
     assert "before" not in residual.get_title()
 
 
@@ -692,9 +706,15 @@ def test_the_forest_shows_what_was_given_and_both_fits(biased):
     axes = figures.parameter_forest(changes).axes[0]
     assert axes.get_legend_handles_labels()[1] == ["given, prior", "without", "with"]
     given, without, fitted = (np.asarray(container.lines[0].get_xdata(), float) for container in axes.containers)
-    np.testing.assert_array_equal(given, 0.0)
-    np.testing.assert_allclose(without, [(item.without - item.given) / item.prior_sd for item in changes])
-    np.testing.assert_allclose(fitted, [(item.fitted - item.given) / item.prior_sd for item in changes])
+    np.testing.assert_array_equal(without, 0.0)
+    np.testing.assert_allclose(given, [(item.given - item.without) / item.without_sd for item in changes])
+    np.testing.assert_allclose(fitted, [item.shift for item in changes])
+    low, high = axes.get_xlim()  # both fits are seen as bars, however wide the prior is
+    assert low < min(fitted.min(), -1.96)
+    assert high > max(fitted.max(), 1.96)
+    assert high - low < 4.0 * max(np.abs(fitted).max(), 1.96) + 12.0
+    beyond = [f"given at {value:+.0f}".replace("-", "−") for value in given if not low <= value <= high]
+    assert [text.get_text() for text in axes.texts] == beyond
     assert [label.get_text() for label in axes.get_yticklabels()] == [item.name for item in changes]
 
 
@@ -740,7 +760,7 @@ RECORD, ADVICE, ORIGIN = "Right in 97 of 100 cases.", "Fly next.csv, 60 s.", "st
 @pytest.fixture(scope="module")
 def printed(biased, clean, disturbance, readings, tmp_path_factory):
     """Return a function that prints the report of a verdict, once, and reads it."""
-    limits, appendix = (import_module(f"bayesid.report.diagnosis.{name}") for name in ("limits_page", "appendix"))
+    module = import_module("bayesid.report.diagnosis.diagnosis_report")
     file = tmp_path_factory.mktemp("printed") / "report.pdf"
 
     @cache
@@ -760,8 +780,8 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
         return result, PdfText.read(file)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(limits, "integration_error_at", lambda posterior, z: 1e-3)
-        patch.setattr(appendix, "sensor_fits", lambda posterior, z: readings)
+        patch.setattr(module, "integration_error_at", lambda posterior, z: 1e-3)
+        patch.setattr(module, "sensor_fits", lambda posterior, z: readings)
         yield read
 
 
@@ -787,7 +807,7 @@ STATUSES = [
     Status.EXPLAINED,
     *(pytest.param(status, marks=pytest.mark.slow) for status in Status if status is not Status.EXPLAINED),
 ]
-LAST = ("Next experiment and limits", "Assumptions", "Appendix: robustness of the verdict", "Measured and simulated")
+LAST = ("Next experiment and limits", "Measured and simulated", "Assumptions", "Appendix: robustness of the verdict")
 
 
 @pytest.mark.parametrize("status", STATUSES)
@@ -799,9 +819,9 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         assert f"{number} {title}" in text
     for sentence in (
         sentences.verdict_sentence(result),
-        sentences.gain_sentence(result),
         sentences.alarm_sentence(result),
         action_sentence(result),
+        robustness_sentence(result),
         *advice_sentences(result),
         *method_sentences(result),
         computation_sentence(result),
@@ -809,8 +829,6 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         *(meaning for _, meaning in GLOSSARY),
     ):
         assert sentence in text
-    for row in error_rows(result.simulation_errors, named):
-        assert text.row(*row)
     for row in gain_rows(result):
         assert text.row(*row) if named else text.row(row[0], row[1], row[3])
     for row in change_rows(result.parameter_changes, named):
@@ -819,11 +837,12 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         assert text.row(*row)
     for row in cause_rows(result) if named else ():
         assert text.row(*row)
+    weighed = {cause for item in result.probabilities.sets[:6] for cause in item.causes}
     for rows in (
         set_rows(result, 6),
         sensitivity_rows(result),
-        bound_rows(dict(result.bounds)),
-        pair_rows(result.inseparable_pairs[:10]),
+        bound_rows({label: bounds for label, bounds in result.bounds.items() if label in weighed}),
+        pair_rows(result.inseparable_pairs[:6]),
         unseen_rows(result.unseen_candidates),
         joint_rows(result.posterior),
     ):
@@ -855,7 +874,10 @@ def test_without_a_record_the_box_has_none(biased):
     assert entries["Cause"].startswith("accel-bias, probability > 0.999. The accelerometer")
     assert entries["Size, ± 95 %"] == size_text(biased.after, "accel-bias")
     assert entries["Changes"].startswith("Without the named causes, base_link.mass would be wrong by 25 standard dev")
-    assert "accel 3.2 × 10⁻⁵ before, 1.7 × 10⁻⁵ after m/s²" in entries["Changes"]
+    assert "accel 3.2 × 10⁻⁵ before, 1.7 × 10⁻⁵ after (noise alone 1.7 × 10⁻⁵) m/s²" in entries["Changes"]
+    change = biased.motion_change
+    assert f"the predicted base rate by up to {format_number(change.rate, 2)} rad/s" in entries["Changes"]
+    assert f"of {change.tip_frame} by up to {format_number(1e3 * change.tip, 2)} mm." in entries["Changes"]
 
 
 def test_plots_of_a_diagnosis_take_axes(biased, disturbance):
@@ -899,17 +921,69 @@ def test_an_unknown_cause_is_shown_as_a_torque_with_its_correlations(printed):
     assert "Repeat a manoeuvre unchanged at a later time" in text
 
 
-def test_the_identification_follows_the_diagnosis(biased, tmp_path, monkeypatch):
-    added = []
-    module = import_module("bayesid.report.diagnosis.diagnosis_report")
-    monkeypatch.setattr(module, "add_identification", lambda _, result, said: added.append(result))
-    sampled = SimpleNamespace()
+def test_samples_are_compared_with_the_fit_and_not_reported_twice(biased, readings, tmp_path):
+    changes, amplitudes = biased.parameter_changes, amplitudes_of(biased.after, "accel-bias")
+    mean = np.array([item.fitted for item in changes])
+    sd = np.array([item.fitted_sd for item in changes])
+    mean[1] -= 0.37 * sd[1]
+    sizes = [
+        SimpleNamespace(label="accel-bias", name=item.quantity.name, mean=item.mean, sd=item.sd) for item in amplitudes
+    ]
+    sizes[2].sd *= 1.25
+    fit = biased.before.fit
+    sampled = SimpleNamespace(
+        bodies={"base_link": SimpleNamespace(mean=mean, sd=sd)},
+        effect_quantities=sizes,
+        posterior=fit.posterior,
+        integration_error=1e-3,
+        sensor_fits=readings,
+        chains=SimpleNamespace(
+            origin="emcee", evaluations=9, effective_samples=8.0, r_hat=1.0, autocorrelation=2.0, converged=True
+        ),
+        evidence=SimpleNamespace(
+            evaluations=7, effective_samples=6.0, pareto_k=-0.1, trusted=True, value=1.0, error=0.1
+        ),
+        optimum=SimpleNamespace(evaluations=5, converged=True, log_evidence=lambda posterior: 1.0),
+        seconds=1.0,
+        disagreements=["Two methods disagree."],
+    )
+    said = sampled_sentence(biased, sampled)
+    assert "by at most 0.37 standard deviations (base_link.com.x)" in said
+    assert "the standard deviations by at most 25 % (accel-bias.z)." in said
     diagnosis_report(replace(biased, identification=sampled), "Study", tmp_path / "report.pdf")
-    assert added == [sampled]
     text = PdfText.read(tmp_path / "report.pdf")
-    assert "How the verdict was reached" in text
+    assert said in text
     assert "The extended model, sampled" in text
-    assert "Assumptions" not in text
+    assert "Pareto k-hat −0.10" in text
+    assert "Two methods disagree." in text
+    assert "How the verdict was reached" in text
+    for title in ("Assumptions", "Measured and simulated"):
+        assert title in text
+    for title in ("Result", "Robot and manoeuvres", "Uncertainty", "Computation"):
+        assert all(f"{number} {title}" not in text for number in range(1, 12))
+
+
+def test_the_motions_of_both_fits_are_compared(biased, clean):
+    change = biased.motion_change
+    samples = [trace(side.fit.posterior, side.fit.z, side.fit.data).sample for side in (biased.before, biased.after)]
+    rates = [np.asarray(sample.rate)[0] for sample in samples]
+    assert change.rate == pytest.approx(np.linalg.norm(rates[1] - rates[0], axis=1).max())
+    assert 0.0 < change.tip < 1.0
+    assert biased.to_dict()["motion_change"]["tip"] == {"frame": change.tip_frame, "largest": change.tip, "unit": "m"}
+    assert motion_change(biased.after, biased.after).tip == motion_change(biased.after, biased.after).rate == 0.0
+    assert clean.motion_change is None
+
+
+def test_the_robot_is_seen_from_where_arrows_have_their_full_length():
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 2.0) for z in (0.0, 3.0)])
+    rng = np.random.default_rng(1)
+    for count in (0, 1, 2):
+        arrows = [vector / np.linalg.norm(vector) for vector in rng.normal(size=(count, 3))]
+        view = view_of(corners, arrows)
+        np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
+        for arrow in arrows:
+            assert np.linalg.norm(view[:2] @ arrow) > 0.99
+    assert ConvexHull(corners @ view_of(corners, [])[:2].T).volume > 6.0  # the area of the largest side
 
 
 def test_the_verdict_outlives_an_interrupted_sampling(biased, tmp_path, monkeypatch):

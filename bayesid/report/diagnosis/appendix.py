@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayesid._io.words import joined
 from bayesid.diagnosis import Candidate, Diagnosis, TorqueReading
 from bayesid.diagnosis.candidates.cause_kind import CauseAmplitude
-from bayesid.inference.predicted_readings import sensor_fits
-from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, amplitude_text, limit_text, verdict_text
+from bayesid.report.diagnosis.causes_page import SETS
 from bayesid.report.diagnosis.diagnosis_sentences import torque_size
 from bayesid.report.diagnosis.evidence_page import add_other_residuals
 from bayesid.report.document import Document, Rows
@@ -28,9 +28,9 @@ from bayesid.simulation.effects.effect_parameters import PhysicalBound
 __all__ = [
     "GLOSSARY",
     "add_appendix",
-    "add_measured",
     "bound_rows",
     "candidate_rows",
+    "robustness_sentence",
     "sensitivity_rows",
     "torque_rows",
 ]
@@ -39,14 +39,15 @@ GLOSSARY = (
     ("σ", "Standard deviation of a sensor's noise per sample, including encoder noise propagated by the dynamics."),
     ("chi-square per sample", "Mean square of the residuals in units of σ; one if the model is correct."),
     ("log evidence", "Natural logarithm of the probability of the data under a set of causes over that under none."),
+    ("log BF", "Natural logarithm of the Bayes factor of a candidate alone over none."),
     ("probability", "Of a set: evidence times prior over the sum of all sets. Of a cause: sum over the sets with it."),
     ("class", "Causes whose effects on the model these data cannot distinguish; they share a probability."),
     ("something unknown", "Any candidate outside the catalogue: a smooth torque, force or sensor error, or a pulse."),
     (
-        "p, family-wise",
+        "p, adjusted",
         "Probability that noise alone makes the most significant of all tests at least this significant.",
     ),
-    ("signal to noise", "Square root of a candidate's decrease of chi-square minus its degrees of freedom."),
+    ("SNR", "Signal-to-noise ratio: square root of a candidate's decrease of chi-square minus its degrees of freedom."),
     ("power", "Probability that a candidate with a size drawn from its prior would have raised the alarm."),
     ("95 % limit", "Value below which the magnitude of a quantity lies with a probability of 95 %."),
     ("cosine", "Correlation of the signals of two causes, without the part that the model's unknowns can explain."),
@@ -61,22 +62,15 @@ SEEN = 2.0  # distance from zero, in standard deviations, above which an amplitu
 def add_appendix(document: Document, result: Diagnosis) -> None:
     """Add sensitivity, candidates, bounds, the residuals of the other recordings, and the glossary."""
     document.section("Appendix: robustness of the verdict")
-    changed = result.sensitivity.changes
-    document.paragraph(
-        f"The verdict would change under {len(changed)} of {len(result.sensitivity.others)} other choices"
-        + (f": {', '.join(changed)}." if changed else ".")
-    )
-    document.table(
-        ["choice", "verdict", "changed"],
-        sensitivity_rows(result),
-        "Sensitivity of the verdict to the two numbers of the prior and to the range of the causes' scales.",
-    )
+    document.paragraph(robustness_sentence(result))
+    if rows := sensitivity_rows(result):
+        document.table(["choice", "verdict"], rows, "Choices that would change the verdict.")
     _add_candidates(document, result)
     _add_torques(document, result)
     document.table(
         ["cause", "largest size:", "why a larger size is implausible"],
-        bound_rows(dict(result.bounds)),
-        "Physical bounds on the scales of the causes.",
+        bound_rows({label: result.bounds[label] for label in _weighed(result) if label in result.bounds}),
+        f"Physical bounds on the scales of the causes in the {SETS} most probable sets; diagnosis.json contains all.",
     )
     add_other_residuals(document, result)
     document.table(["term", "meaning"], [list(entry) for entry in GLOSSARY], "Glossary.")
@@ -87,15 +81,14 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
         [
             "candidate",
             "probability:",
-            "signal to noise:",
+            "SNR:",
             "p, adjusted:",
-            "log Bayes factor:",
+            "log BF:",
             "size, or 95 % limit",
             "power:",
         ],
         candidate_rows(result.candidates, result.alarm.level),
         f"All {len(result.candidates)} candidates, each added alone to the present model, from the linear response. "
-        "The probability is that of being at work, whatever accompanies it. The p-value is adjusted for all tests. "
         "Detected candidates have a size; for the others, the magnitudes lie below the given limits with 95 % "
         "probability. Empty cells were not evaluated.",
     )
@@ -109,17 +102,6 @@ def _add_torques(document: Document, result: Diagnosis) -> None:
             "Candidates that could act on the joint torques alone, evaluated after the verdict on the motion: the "
             "probability of being at work, and the size in that case. Something unknown is a torque with any smooth "
             "time history at one joint.",
-        )
-
-
-def add_measured(document: Document, result: Diagnosis) -> None:
-    """Add measured and simulated readings of every recording, with the named causes in the model."""
-    document.section("Measured and simulated")
-    posterior = result.posterior
-    for manoeuvre, sensors in zip(posterior.manoeuvres, sensor_fits(posterior, result.start), strict=True):
-        document.figure(
-            figures.measured_against_simulated(sensors),
-            f"Measured and simulated readings of {manoeuvre.recording.name}, sensor axes; below, the residual in σ.",
         )
 
 
@@ -162,16 +144,23 @@ def torque_rows(found: TorqueReading) -> Rows:
     ]
 
 
-def sensitivity_rows(result: Diagnosis) -> Rows:
-    """Return choice, verdict under it, and whether it is another, the verdict itself first."""
+def robustness_sentence(result: Diagnosis) -> str:
+    """Return under which choices of the prior's numbers and of the range of scales the verdict stays the same."""
     sensitivity = result.sensitivity
-    return [
-        ["as chosen", verdict_text(sensitivity.verdict), ""],
-        *(
-            [name, verdict_text(other), "yes" if name in sensitivity.changes else "no"]
-            for name, other in sensitivity.others.items()
-        ),
-    ]
+    same = [name for name in sensitivity.others if name not in sensitivity.changes]
+    text = f"The verdict would change under {len(sensitivity.changes)} of {len(sensitivity.others)} other choices."
+    return f"{text} It remains the same with {joined(same)}." if same else text
+
+
+def sensitivity_rows(result: Diagnosis) -> Rows:
+    """Return each choice that changes the verdict, and the verdict under it."""
+    others = result.sensitivity.others
+    return [[name, verdict_text(others[name])] for name in result.sensitivity.changes]
+
+
+def _weighed(result: Diagnosis) -> set[str]:
+    """Return the causes of the most probable sets."""
+    return {cause for item in result.probabilities.sets[:SETS] for cause in item.causes}
 
 
 def bound_rows(bounds: dict[str, tuple[PhysicalBound, ...]]) -> Rows:

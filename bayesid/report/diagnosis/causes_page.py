@@ -1,4 +1,4 @@
-"""Third page of a diagnosis report: why these causes, with what else could be at work and whether it is plausible."""
+"""Causes in a diagnosis report: why these, with what else could be at work and whether it is plausible."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from bayesid.report.numbers import (
     format_unit,
 )
 
-__all__ = ["add_causes", "cause_rows", "set_rows"]
+__all__ = ["SETS", "add_causes", "cause_rows", "set_rows"]
 
-SETS = 6  # sets in the table of the most probable
-BARS = 20  # largest number of bars of the figure of candidates
+SETS = 6
+"""Number of sets in the table of the most probable."""
+
+BARS = 12  # largest number of bars of the figure of candidates
 
 
 def add_causes(document: Document, result: Diagnosis) -> None:
@@ -51,7 +53,6 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each added alone "
         "to the present model. One cause can make several candidates stand out, because they explain parts of the same "
         "residual.",
-        floating=True,
     )
 
 
@@ -97,13 +98,13 @@ def set_rows(result: Diagnosis, most: int) -> Rows:
         before = None
         for size in result.sizes_of(item) or [GroupSize(NOTHING)]:
             name = size.cause if before is None else f"+ {size.cause}" if size.cause != before else ""
-            rows.append([name, *(whole if before is None else ["", ""]), *_size_cells(size)])
+            rows.append([name, *(whole if before is None else ["", ""]), *_size_cells(size, item.generic)])
             before = size.cause
     return rows
 
 
-def _size_cells(size: GroupSize) -> list[str]:
-    if size.cause == NOTHING:
+def _size_cells(size: GroupSize, generic: str | None) -> list[str]:
+    if size.cause == NOTHING or (size.cause == generic and size.size is None):
         return ["", "", ""]
     if size.size is None:
         return ["fixed by physics", "", ""]

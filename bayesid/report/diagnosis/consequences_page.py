@@ -1,4 +1,4 @@
-"""Fourth page of a diagnosis report: the inertial parameters with and without the causes, and the disturbance."""
+"""Consequences in a diagnosis report: the inertial parameters with and without the causes, and the disturbance."""
 
 from __future__ import annotations
 
@@ -6,14 +6,23 @@ from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, Frame, Status
 from bayesid.diagnosis.outcome.disturbance import TorqueCorrelation
-from bayesid.diagnosis.outcome.gain import ParameterChange, SimulationError
+from bayesid.diagnosis.outcome.gain import ParameterChange
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import wrench_sentence
 from bayesid.report.document import Document, Rows
 from bayesid.report.numbers import format_number, format_quantity, format_signed, format_unit
 
-__all__ = ["add_consequences", "change_rows", "correlation_rows", "error_rows", "most_moved"]
+__all__ = [
+    "add_changes",
+    "add_consequences",
+    "change_rows",
+    "correlation_rows",
+    "most_moved",
+    "of_most_moved_body",
+]
+
+LISTED = ("mass", "com.x", "com.y", "com.z", "inertia.xx", "inertia.yy", "inertia.zz")  # in the table of the first page
 
 AXES = {Frame.BASE: "base", Frame.ORBIT: "orbit (zenith, along-track, normal)", Frame.INERTIAL: "inertial"}
 """Names of the axes in which a disturbance is drawn."""
@@ -30,31 +39,19 @@ def add_changes(document: Document, result: Diagnosis, changes: Sequence[Paramet
 
 
 def add_consequences(document: Document, result: Diagnosis) -> None:
-    """Add all inertial parameters and the reconstructed disturbance."""
+    """Add the inertial parameters that the first page omits, and the reconstructed disturbance."""
     named, changes = result.named, result.parameter_changes
     document.section("Consequences" if named else "Inertial parameters and the disturbance")
-    if changes:
-        add_changes(
-            document,
-            result,
-            changes,
-            "Inertial parameters, ± sd: as given with the prior's width, fitted without the named causes, and fitted "
-            "with them. A shift by many standard deviations of the fit without the causes is an error that would "
-            "otherwise have gone unnoticed."
-            if named
-            else "Inertial parameters, ± sd: as given with the prior's width, and fitted with the present model.",
-        )
+    shown = of_most_moved_body(changes)
+    if rest := [item for item in changes if item not in shown]:
+        add_changes(document, result, rest, "The other inertial parameters, ± sd.")
+    if named and changes:
         document.figure(
-            figures.parameter_forest(changes, named),
-            "Inertial parameters relative to the given values, as multiples of the prior's width; bars contain 95 %. "
-            "Widths without the causes assume that the present model is correct.",
-            floating=True,
+            figures.parameter_forest(changes),
+            "Inertial parameters relative to their values without the named causes; bars contain 95 %. The axis is "
+            "limited to the fits: a prior that reaches beyond it is a line over the whole width. A shift beyond the "
+            "bars is an error that would otherwise have gone unnoticed.",
         )
-    document.table(
-        ["sensor", "unit", *(["before:", "after:"] if named else ["error:"]), "noise alone:"],
-        error_rows(result.simulation_errors, named),
-        "Root mean square error of the simulation, decorrelated: vector length over all axes.",
-    )
     _add_disturbance(document, result)
 
 
@@ -69,13 +66,14 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
     document.paragraph(
         f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
         "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
-        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included. "
-        f"{wrench_sentence(wrench)}"
+        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included."
+        + (f" {wrench_sentence(wrench)}" if named else "")  # the first page states it where nothing is named
     )
     if wrench.signal_to_noise > 0.0:
         _add_wrench(document, result)
-        if named:
-            document.paragraph(f"Residual with the named causes in the model: {wrench_sentence(result.unexplained)}")
+        if named and result.verdict.status is not Status.PARTLY_EXPLAINED:  # of which the first page states it
+            rest = wrench_sentence(result.unexplained)
+            document.paragraph(f"With the named causes in the model: {rest[0].lower()}{rest[1:]}")
 
 
 def _add_wrench(document: Document, result: Diagnosis) -> None:
@@ -91,21 +89,20 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
         document.figure(
             figures.plot_disturbance(result, frame),
             f"Reconstructed torque and force, {AXES[frame]} axes.{'' if cause is None else dashed}",
-            floating=True,
+            floating=result.named,
         )
     if not result.named:
         document.figure(
             figures.wrench_spectrum(result.disturbance),
             "Amplitude of the reconstructed torque by frequency, base axes, up to the highest resolved frequency.",
-            floating=True,
         )
-    if rows := correlation_rows(result.torque_correlations):
-        document.table(
-            ["component, base axes", "correlated with", "correlation:"],
-            rows,
-            "Largest correlations of the reconstructed torque with known time series, all recordings pooled. Because "
-            "the series are smooth, a correlation of one half can occur by chance.",
-        )
+        if rows := correlation_rows(result.torque_correlations):
+            document.table(
+                ["component, base axes", "correlated with", "correlation:"],
+                rows,
+                "Largest correlations of the reconstructed torque with known time series, all recordings pooled. "
+                "Because the series are smooth, a correlation of one half can occur by chance.",
+            )
 
 
 def change_rows(changes: Sequence[ParameterChange], named: bool = True) -> Rows:
@@ -120,24 +117,19 @@ def change_rows(changes: Sequence[ParameterChange], named: bool = True) -> Rows:
     return rows
 
 
-def error_rows(errors: Sequence[SimulationError], named: bool = True) -> Rows:
-    """Return sensor, unit, error before and after, and what noise alone makes; only before where nothing is named."""
-    return [
-        [
-            item.kind.value,
-            format_unit(item.kind.unit),
-            format_number(item.before),
-            *([format_number(item.after)] if named else []),
-            format_number(item.noise),
-        ]
-        for item in errors
-    ]
-
-
 def most_moved(changes: Sequence[ParameterChange], most: int) -> list[ParameterChange]:
     """Return the parameters that move most in standard deviations, in their usual order."""
     chosen = sorted(changes, key=lambda item: -abs(item.shift))[:most]
     return [item for item in changes if item in chosen]
+
+
+def of_most_moved_body(changes: Sequence[ParameterChange]) -> list[ParameterChange]:
+    """Return mass, centre of mass and moments of inertia of the body with the parameter that moves most."""
+    names = [moved.name for moved in most_moved(changes, 1)]
+    bodies = [
+        name.rpartition(".inertia.")[0] or name.rpartition(".com.")[0] or name.rpartition(".")[0] for name in names
+    ]
+    return [change for change in changes if change.name in {f"{body}.{key}" for body in bodies for key in LISTED}]
 
 
 def correlation_rows(correlations: Sequence[TorqueCorrelation]) -> Rows:

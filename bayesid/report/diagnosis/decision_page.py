@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
+from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Hypothesis, Status
 from bayesid.diagnosis.outcome.gain import ParameterChange
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, set_text, size_text, verdict_text
-from bayesid.report.diagnosis.consequences_page import add_changes, most_moved
+from bayesid.report.diagnosis.consequences_page import add_changes, most_moved, of_most_moved_body
 from bayesid.report.diagnosis.diagnosis_sentences import (
     action_sentence,
     cause_summary,
@@ -28,8 +29,7 @@ from bayesid.report.numbers import (
 
 __all__ = ["add_decision", "conditions_text", "decision_entries", "probability_rows"]
 
-LISTED = ("mass", "com.x", "com.y", "com.z", "inertia.xx", "inertia.yy", "inertia.zz")  # in the table of the first page
-CLASSES = 3  # classes of causes in the table of probabilities
+CLASSES = 3  # classes of causes whose probabilities are stated
 
 
 def add_decision(document: Document, result: Diagnosis, record: str | None = None) -> None:
@@ -46,26 +46,19 @@ def add_decision(document: Document, result: Diagnosis, record: str | None = Non
     document.decision(f"Decision. {verdict[:1].upper()}{verdict[1:]}", decision_entries(result, record))
     document.figure(
         figures.plot_verdict(result),
-        "Left: the robot as given, with the cause where it acts. Right: the residual of "
-        f"{result.recordings[result.strongest_recording]} on the axis that "
-        "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
+        f"{_picture_text(result)} Right: the residual of {result.recordings[result.strongest_recording]} on the axis "
+        "that changes most, with its running mean; the grey band is ± 2 σ of the noise.",
     )
     if result.parameter_changes:
         add_changes(
             document,
             result,
-            _of_most_moved_body(result.parameter_changes),
-            "Mass, centre of mass and moments of inertia: as given, fitted without the named causes, and fitted with "
-            "them, ± sd."
+            of_most_moved_body(result.parameter_changes),
+            "Inertial parameters, ± sd: as given, fitted without and with the named causes, and shift in sd without "
+            "them."
             if result.named
-            else "Mass, centre of mass and moments of inertia: as given, and fitted with the present model, ± sd. A "
-            "later page lists all parameters.",
+            else "Inertial parameters, ± sd: as given, and fitted with the present model.",
         )
-    document.table(
-        ["at work", "probability:"],
-        probability_rows(result, CLASSES),
-        "Probability of being at work, whatever accompanies it; causes that these data cannot distinguish share a row.",
-    )
 
 
 def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple[str, str]]:
@@ -78,6 +71,8 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
         ("Alternative", f"{set_text(names)}, probability {format_probability(result.probability_of(names))}")
         for names in verdict.ambiguous_with
     ]
+    listed = "; ".join(" ".join(row) for row in probability_rows(result, CLASSES))
+    entries.append(("Probable", f"{listed}; each whatever accompanies it."))
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         entries.append(("Unexplained", wrench_sentence(result.unexplained)))
     if result.torques is not None:
@@ -92,11 +87,14 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
     return entries
 
 
-def _of_most_moved_body(changes: Sequence[ParameterChange]) -> list[ParameterChange]:
-    """Return mass, centre of mass and moments of inertia of the body with the parameter that moves most."""
-    (moved,) = most_moved(changes, 1)
-    body = moved.name.rpartition(".inertia.")[0] or moved.name.rpartition(".com.")[0] or moved.name.rpartition(".")[0]
-    return [change for change in changes if change.name in {f"{body}.{quantity}" for quantity in LISTED}]
+def _picture_text(result: Diagnosis) -> str:
+    """Return what the picture of the robot shows."""
+    if not result.named:
+        return "Left: the robot at the start."
+    return (
+        "Left: the robot at the start, viewed so that arrows have their full length, with the cause in blue where it "
+        "acts."
+    )
 
 
 def _cause_text(result: Diagnosis, cause: str) -> str:
@@ -105,21 +103,38 @@ def _cause_text(result: Diagnosis, cause: str) -> str:
 
 
 def _change_text(result: Diagnosis) -> str:
-    """Return the parameter that moves most and the errors of the simulation, before and after."""
-    text = "" if result.named else "No inertial parameter changes, because nothing is added to the model. "
-    for moved in most_moved(result.parameter_changes, 1) if result.named else ():
-        relative = abs(moved.fitted / moved.without - 1.0) if moved.without else 0.0
-        share = f", {format_percent(relative, 2)}" if 0.0 < relative < 1.0 else ""  # moments about zero have no share
-        text = (
-            f"Without the named causes, {moved.name} would be wrong by {format_number(abs(moved.shift), 2)} standard "
-            f"deviations{share}: {format_quantity(moved.without, moved.without_sd)} in place of "
-            f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)}. No parameter changes more. "
-        )
+    """Return what would be wrong without the named causes, and the errors of the simulation, before and after."""
+    text = "No inertial parameter changes, because nothing is added to the model."
+    if result.named:
+        wrong = [*map(_moved_text, most_moved(result.parameter_changes, 1)), *_motion_texts(result)]
+        text = f"Without the named causes, {joined(wrong)}."
     errors = []
     for error in result.simulation_errors:
         after = f" before, {format_number(error.after, 2)} after" if result.named else ""
-        errors.append(f"{error.kind.value} {format_number(error.before, 2)}{after} {format_unit(error.kind.unit)}")
-    return f"{text}RMS error of the simulation: {'; '.join(errors)}."
+        errors.append(
+            f"{error.kind.value} {format_number(error.before, 2)}{after} (noise alone "
+            f"{format_number(error.noise, 2)}) {format_unit(error.kind.unit)}"
+        )
+    return f"{text} RMS error of the simulation: {'; '.join(errors)}."
+
+
+def _moved_text(moved: ParameterChange) -> str:
+    """Return by how much the parameter that moves most would be wrong."""
+    relative = abs(moved.fitted / moved.without - 1.0) if moved.without else 0.0
+    share = f" or {format_percent(relative, 2)}" if 0.0 < relative < 1.0 else ""  # moments about zero have no share
+    return (
+        f"{moved.name} would be wrong by {format_number(abs(moved.shift), 2)} standard deviations{share}, more than "
+        f"any other parameter ({format_quantity(moved.without, moved.without_sd)} in place of "
+        f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)})"
+    )
+
+
+def _motion_texts(result: Diagnosis) -> Iterator[str]:
+    """Yield by how much the predicted motion would be wrong."""
+    if change := result.motion_change:
+        yield f"the predicted base rate by up to {format_number(change.rate, 2)} rad/s"
+        if change.tip_frame is not None:
+            yield f"the predicted position of {change.tip_frame} by up to {format_number(1e3 * change.tip, 2)} mm"
 
 
 def conditions_text(hypothesis: Hypothesis) -> str:

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: five pages from the decision to the next experiment, and an appendix."""
+"""The report of a diagnosis: from the decision to the next experiment, and an appendix."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from pathlib import Path
 from bayesid._io.errors import InputError
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis
-from bayesid.inference import Identification
 from bayesid.inference.conventions import convention_families
-from bayesid.report.diagnosis.appendix import add_appendix, add_measured
+from bayesid.inference.predicted_readings import integration_error_at, sensor_fits
+from bayesid.report.diagnosis.appendix import add_appendix
 from bayesid.report.diagnosis.causes_page import add_causes
 from bayesid.report.diagnosis.consequences_page import add_consequences
 from bayesid.report.diagnosis.decision_page import add_decision
 from bayesid.report.diagnosis.evidence_page import add_evidence
 from bayesid.report.diagnosis.limits_page import add_assumptions, add_limits
+from bayesid.report.diagnosis.sampled_page import add_measured, add_sampled
 from bayesid.report.document import Document
-from bayesid.report.identification_report import add_identification
 from bayesid.report.numbers import format_number
 
 __all__ = ["diagnosis_report"]
@@ -54,20 +54,27 @@ def diagnosis_report(
         add_causes(document, result)
     add_consequences(document, result)
     add_limits(document, result, result.advice)
+    _add_model(document, result)
+    add_appendix(document, result)
+    document.write(file, filled=True)
+
+
+def _add_model(document: Document, result: Diagnosis) -> None:
+    """Add readings, samples and assumptions of the extended model, or why it cannot be simulated."""
     identification = result.identification
-    many = result.bounded is not None  # of many recordings the extended model is simulated in full only to be sampled
-    refusal = None if identification is not None or many else _refusal(result)
-    if refusal is not None:
+    if identification is not None:
+        add_measured(document, result, identification.sensor_fits)
+        add_sampled(document, result, identification)
+        add_assumptions(document, identification.posterior, identification.integration_error)
+    elif result.bounded is not None:  # of many recordings the extended model is simulated in full only to be sampled
+        present = result.before.fit
+        add_assumptions(document, present.posterior, integration_error_at(present.posterior, present.z))
+    elif (refusal := _refusal(result)) is not None:
         document.section("Assumptions")
         document.paragraph(f"The extended model was neither simulated in full nor sampled: {refusal}.")
-    elif identification is None:
-        add_assumptions(document, result)
-    add_appendix(document, result)
-    if identification is not None:
-        _add_sampled(document, result, identification)
-    elif refusal is None and not many:
-        add_measured(document, result)
-    document.write(file)
+    else:
+        add_measured(document, result, sensor_fits(result.posterior, result.start))
+        add_assumptions(document, result.posterior, integration_error_at(result.posterior, result.start))
 
 
 def _add_contradiction(document: Document, result: Diagnosis) -> None:
@@ -90,13 +97,3 @@ def _refusal(result: Diagnosis) -> InputError | None:
     except InputError as error:
         return error
     return None
-
-
-def _add_sampled(document: Document, result: Diagnosis, identification: Identification) -> None:
-    document.section("The extended model, sampled" if result.named else "The present model, sampled")
-    document.paragraph(
-        "The rest of this report is the identification by sampling of the "
-        + ("model with the named causes" if result.named else "present model")
-        + ": from here on, the uncertainties do not rely on linearisation."
-    )
-    add_identification(document, identification, [])

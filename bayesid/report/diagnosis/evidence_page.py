@@ -1,4 +1,4 @@
-"""Second page of a diagnosis report: residuals before and after, and the prediction of recordings left out."""
+"""Evidence in a diagnosis report: residuals before and after, and the prediction of recordings left out."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.outcome.gain import folds_of
 from bayesid.report import figures
-from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence, gain_sentence
+from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence
 from bayesid.report.document import Document, Rows
 from bayesid.report.numbers import format_fixed
 
 __all__ = ["add_evidence", "add_other_residuals", "gain_rows"]
 
-RECORDINGS = 6  # largest number of further recordings whose residuals are drawn over time
+RECORDINGS = 2  # largest number of further recordings whose residuals are drawn over time
 
 
 def add_evidence(document: Document, result: Diagnosis) -> None:
@@ -22,7 +22,7 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
     document.section("Evidence")
     strongest = result.strongest_recording
     document.paragraph(
-        f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and decorrelated, "
+        f"{alarm_sentence(result)} Residuals are in units of their noise σ and decorrelated, "
         "so that a correct model gives independent values with a standard deviation of one. "
         + (
             "Before refers to the present model, after to the one with the named causes and all unknowns fitted again."
@@ -35,13 +35,11 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
         f"Residuals of {result.recordings[strongest]}"
         + (", the recording that changes most" if len(result.recordings) > 1 else "")
         + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over one fortieth of the recording.",
-        floating=True,
     )
     document.figure(
         figures.plot_spectrum(result),
         "Spectra of the residuals, with all recordings pooled and frequencies grouped into bins of equal width: white "
         "noise has a level of one. The effect of a disturbance or of a wrong body appears in the lowest bins.",
-        floating=True,
     )
     _add_gain(document, result)
 

@@ -1,4 +1,4 @@
-"""Fifth page of a diagnosis report: what to fly next, what could not be seen, the method, and the assumptions."""
+"""Limits in a diagnosis report: what to fly next, what could not be seen, the method, and the assumptions."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from bayesid._io.words import joined
 from bayesid.diagnosis import Candidate, Diagnosis, Status
 from bayesid.diagnosis.outcome.inseparable_causes import CausePair
-from bayesid.inference.predicted_readings import integration_error_at
+from bayesid.inference.posterior import Posterior
 from bayesid.report.diagnosis.cause_words import limit_text
 from bayesid.report.diagnosis.diagnosis_sentences import action_sentence, advice_sentences
 from bayesid.report.document import Document, Rows
@@ -26,15 +27,15 @@ __all__ = [
 ]
 
 NEXT = "Next experiment and limits"  # title of the section that says what to fly next
-PAIRS = 10  # largest number of pairs in the table of causes that imitate each other
+PAIRS = 6  # largest number of pairs in the table of causes that imitate each other
 LIMITS = 6  # largest number of limits in a cell of the table of candidates out of reach
 
 
 def add_limits(document: Document, result: Diagnosis, advice: str | None = None) -> None:
     """Add the manoeuvres to fly, the candidates out of reach, the pairs that imitate each other, and the method."""
     document.section(NEXT)
-    document.paragraph(action_sentence(result))
-    document.items([*advice_sentences(result), *([advice] if advice else [])])
+    stated = action_sentence(result)  # on the first page
+    document.items([*(item for item in advice_sentences(result) if item not in stated), *([advice] if advice else [])])
     _add_unseen(document, result)
     if pairs := result.inseparable_pairs[:PAIRS]:
         document.table(
@@ -69,13 +70,19 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
         )
 
 
-def add_assumptions(document: Document, result: Diagnosis) -> None:
-    """Add what the model with the named causes assumes."""
-    present = result.before.fit
-    many = result.bounded is not None and result.identification is None  # what is not built to be sampled
-    posterior, z = (present.posterior, present.z) if many else (result.posterior, result.start)
+def add_assumptions(document: Document, posterior: Posterior, integration_error: float) -> None:
+    """Add what a model assumes.
+
+    Parameters
+    ----------
+    document : Document
+    posterior : Posterior
+        Model with the named causes.
+    integration_error : float
+        Largest error of the integration in standard deviations of a sample.
+    """
     document.section("Assumptions")
-    document.items(list(model_sentences(posterior, integration_error_at(posterior, z))))
+    document.items(list(model_sentences(posterior, integration_error)))
     add_joints(document, posterior)
 
 
@@ -88,8 +95,9 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         "included."
     )
     yield (
-        f"{len(probabilities.causes)} causes of the catalogue are possible here: {', '.join(probabilities.causes)}. "
-        f"In addition, {len(probabilities.generics)} candidates represent causes outside the catalogue: "
+        f"{len(probabilities.causes)} causes of the catalogue are possible here (the appendix lists them"
+        f"{_unlisted(result)}). In addition, {len(probabilities.generics)} candidates represent causes outside the "
+        "catalogue: "
         f"{', '.join(probabilities.generics)}."
     )
     yield (
@@ -118,6 +126,13 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     if result.bounded is not None:
         yield result.bounded
     yield f"Seed of all random numbers: {result.seed}."
+
+
+def _unlisted(result: Diagnosis) -> str:
+    """Return which causes that were considered have no linear response, so that they are no rows of the candidates."""
+    listed = {row.name for row in result.candidates}
+    others = [name for name in result.probabilities.causes if name not in listed]
+    return f", except {joined(others)}" if others else ""
 
 
 def computation_sentence(result: Diagnosis) -> str:

@@ -1,23 +1,23 @@
-"""Figures of a diagnosis: the robot with its causes, strengths of candidates, disturbance, parameters."""
+"""Figures of a diagnosis: verdict, strengths of candidates, disturbance, parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis import Candidate, Diagnosis, DisturbingWrench, Frame, Hypothesis
-from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
-from bayesid.diagnosis.outcome.cause_sizes import Z95, vector_size
+from bayesid.diagnosis import Candidate, Diagnosis, DisturbingWrench, Frame
+from bayesid.diagnosis.outcome.cause_sizes import Z95
 from bayesid.diagnosis.outcome.gain import ParameterChange
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report.figures.figure_style import (
+    AFTER,
     BAND,
+    BEFORE,
     COLOURS,
     PageFigure,
     axis_title,
@@ -31,16 +31,13 @@ from bayesid.report.figures.figure_style import (
     wide_figure,
 )
 from bayesid.report.figures.residual_figures import SIDES, draw_history
-from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, sticks_of
-from bayesid.robot.kinematics import kinematics
-from bayesid.robot.link_shapes import equivalent_box
-from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect
+from bayesid.report.figures.robot_with_causes import draw_robot_with_causes
+from bayesid.report.numbers import format_signed
 from bayesid.simulation.sensors import SensorKind
 
 __all__ = [
+    "GIVEN",
     "candidate_strengths",
-    "cause_marks",
     "moved_axis",
     "parameter_forest",
     "plot_disturbance",
@@ -49,15 +46,18 @@ __all__ = [
     "wrench_spectrum",
 ]
 
-ROBOT = "#888888"
-"""Colour of the robot's sticks."""
-
-ARROW = 0.45  # length of the arrow of a vector, relative to the width of the picture
-PLACES = ("cp", "position")  # names of the quantities of an effect that are a point of the base
+BEYOND = 1.35  # half-width of the figure of parameters, relative to the furthest end of a bar of a fit
 FEW = 7  # largest number of recordings in one figure
 
-GIVEN = "#999999"
+GIVEN = "#8c8c8c"
 """Colour of the values given and their prior."""
+
+PARAMETERS_SHOWN = (
+    ("given, prior", GIVEN, 0.22, "given", "prior_sd"),
+    ("without", BEFORE, 0.0, "without", "without_sd"),
+    ("with", AFTER, -0.22, "fitted", "fitted_sd"),
+)
+"""Name, colour, height and attributes of the values of a parameter that are drawn."""
 
 
 @styled
@@ -76,14 +76,14 @@ def plot_verdict(result: Diagnosis, recording: int | None = None, *, axes: Any =
     recording = result.strongest_recording if recording is None else recording
     sides = result.residuals
     if axes is None:
-        figure = wide_figure(2.3)
+        figure = wide_figure(2.4)
         grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
         panels = [figure.add_subplot(grid[0])]
         panels += list(grid[1].subgridspec(len(sides), 1).subplots(squeeze=False, sharex=True)[:, 0])
     else:
         figure, given = panels_of(axes, 1, 1 + len(sides), 2.3)
         panels = list(given[0])
-    _draw_robot(panels[0], result, recording)
+    draw_robot_with_causes(panels[0], result, recording)
     kind, axis = moved_axis(sides, recording)
     values = [side.series(recording, kind, axis) for side in sides]
     for axes, (time, value), (name, colour) in zip(panels[1:], values, SIDES, strict=False):
@@ -106,109 +106,6 @@ def moved_axis(sides: list[ResidualView], recording: int) -> tuple[SensorKind, i
         return squares[0] - sum(squares[1:])
 
     return max(((kind, axis) for kind in sides[0].kinds for axis in range(kind.size)), key=lambda item: gain(*item))
-
-
-def _draw_robot(axes: Axes, result: Diagnosis, recording: int) -> None:
-    """Draw the robot at the start of a recording, in the projection that shows it and its causes largest."""
-    posterior = result.before.fit.posterior
-    robot, manoeuvre = posterior.model.robot, posterior.manoeuvres[recording]
-    pose = kinematics(robot, manoeuvre.motion.evaluate(manoeuvre.recording.time[:1])).pose[0]
-    box, path = equivalent_box(robot.link(robot.base).inertial), sticks_of(robot, pose)
-    marks = cause_marks(result.after, pose) if result.verdict.causes else []
-    points = np.concatenate([box, *path, *(mark.point[None] for mark in marks)])
-    title, *plane = max(VIEWS, key=lambda view: _shown(points, marks, (view[1], view[2])))
-    across, up = plane
-    draw_box(axes, box, (across, up))
-    draw_sticks(axes, path, (across, up), ROBOT)
-    reach = ARROW * float(np.ptp(points, axis=0).max())
-    for mark in marks:
-        _draw_mark(axes, mark, (across, up), reach)
-    axes.set_title(f"{title}, cause in blue" if marks else title)
-    axes.set_xlabel(f"{'xyz'[across]} [m]")
-    axes.set_ylabel(f"{'xyz'[up]} [m]")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.12)
-    axes.locator_params(axis="both", nbins=4)
-
-
-def _shown(points: Floats, marks: list[CauseMark], plane: tuple[int, int]) -> float:
-    """Return how much of a robot a projection shows, with the share of the causes' arrows that lies in it."""
-    spans = np.ptp(points, axis=0)
-    arrows = [float(np.linalg.norm(mark.direction[list(plane)])) for mark in marks if mark.direction is not None]
-    return float(spans[list(plane)].prod()) * (min(arrows) if arrows else 1.0)
-
-
-def _draw_mark(axes: Axes, mark: CauseMark, plane: tuple[int, int], reach: float) -> None:
-    across, up = plane
-    start = end = (float(mark.point[across]), float(mark.point[up]))
-    axes.plot(*start, "o", color=COLOURS[0], markersize=6, markeredgecolor="white", zorder=5)
-    if mark.direction is not None:
-        end = (start[0] + reach * float(mark.direction[across]), start[1] + reach * float(mark.direction[up]))
-        axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": COLOURS[0], "linewidth": 1.8}, zorder=5)
-        axes.plot(*end, alpha=0.0)  # so that the axes hold the arrow
-    axes.annotate(mark.label, end, (4, 5), textcoords="offset points", color=COLOURS[0], zorder=6)
-
-
-class CauseMark(NamedTuple):
-    """Mark of one cause.
-
-    Attributes
-    ----------
-    label : str
-        Name of the cause.
-    point : (3,) array
-        Where it acts, base frame [m]: the point of a force or a tank, a link's centre of mass, the accelerometer, or
-        the base origin.
-    direction : (3,) array or None
-        Unit vector along a vector in base axes; None where it has none or its direction is not known.
-    """
-
-    label: str
-    point: Floats
-    direction: Floats | None
-
-
-def cause_marks(hypothesis: Hypothesis, pose: Floats) -> list[CauseMark]:
-    """Return a mark for every cause of a hypothesis, in the robot's pose (joints, 4, 4)."""
-    effects = {effect.candidate: effect for effect in hypothesis.fit.effects}
-    robot = hypothesis.fit.posterior.model.robot
-    marks = []
-    for label in hypothesis.labels:
-        effect = effects.get(label)
-        if effect is not None and effect.link is not None:
-            marks.append(CauseMark(label, _centre(robot, effect.link, pose), None))
-            continue
-        place = _place(hypothesis, label)
-        vector = vector_size(hypothesis, label) if place is None else None
-        direction = vector.direction if vector is not None and vector.directed else None
-        marks.append(CauseMark(label, _origin(hypothesis, effect) if place is None else place, direction))
-    return marks
-
-
-def _place(hypothesis: Hypothesis, label: str) -> Floats | None:
-    """Return the point of the base that is among the quantities of a cause."""
-    found = {item.quantity.name: item.mean for item in amplitudes_of(hypothesis, label)}
-    for name in PLACES:
-        keys = [f"{name}.{axis}" for axis in "xyz"]
-        if all(key in found for key in keys):
-            return np.array([found[key] for key in keys])
-    return None
-
-
-def _origin(hypothesis: Hypothesis, effect: Effect | None) -> Floats:
-    """Return where the accelerometer is, for what is wrong with it, and the base origin otherwise."""
-    model = hypothesis.fit.posterior.model
-    if effect is not None and effect.name.startswith(f"{SensorKind.ACCEL.value}-"):
-        for sensor in model.sensors:
-            if sensor.kind is SensorKind.ACCEL:
-                return np.asarray(sensor.position, dtype=float)
-    return np.zeros(3)
-
-
-def _centre(robot: Robot, name: str, pose: Floats) -> Floats:
-    link = robot.link(name)
-    carrier = np.eye(4) if link.joint < 0 else pose[link.joint]
-    return np.asarray((carrier @ link.placement @ np.append(link.inertial.com, 1.0))[:3])
 
 
 @styled
@@ -327,32 +224,36 @@ def wrench_spectrum(wrench: DisturbingWrench) -> Figure:
 
 
 @styled
-def parameter_forest(changes: Sequence[ParameterChange], named: bool = True) -> Figure:
-    """Draw every parameter about its given value, in widths of the prior, as bars of 95 %.
+def parameter_forest(changes: Sequence[ParameterChange]) -> Figure:
+    """Draw every parameter about the fit without the named causes, in its standard deviations, as bars of 95 %.
+
+    The axis is limited to the fits; a given value beyond it is stated at the edge.
 
     Parameters
     ----------
     changes : sequence of ParameterChange
-    named : bool
-        Whether causes are named, so that there is a fit with them.
     """
-    figure = wide_figure(0.7 + 0.26 * len(changes))
+    figure = wide_figure(0.7 + 0.24 * len(changes))
     axes = figure.subplots()
     rows = np.arange(len(changes))[::-1].astype(float)
-    series = [
-        ("given, prior", GIVEN, 0.22, [(item.given, item.prior_sd) for item in changes]),
-        ("without" if named else "fitted", COLOURS[1], 0.0, [(item.without, item.without_sd) for item in changes]),
-    ]
-    if named:
-        series.append(("with", COLOURS[0], -0.22, [(item.fitted, item.fitted_sd) for item in changes]))
-    for name, colour, offset, values in series:
-        centre = [(mean - item.given) / item.prior_sd for (mean, _), item in zip(values, changes, strict=True)]
-        reach = [Z95 * sd / item.prior_sd for (_, sd), item in zip(values, changes, strict=True)]
-        axes.errorbar(centre, rows + offset, xerr=reach, fmt="o", color=colour, markersize=3, linewidth=1.3, label=name)
+    centre, sd = (np.array([getattr(item, key) for item in changes]) for key in ("without", "without_sd"))
+    furthest = 0.0
+    for name, colour, offset, mean_key, sd_key in PARAMETERS_SHOWN:
+        place, reach = (np.array([getattr(item, key) for item in changes]) for key in (mean_key, sd_key))
+        place, reach = (place - centre) / sd, Z95 * reach / sd
+        axes.errorbar(place, rows + offset, xerr=reach, fmt="o", color=colour, markersize=3, linewidth=1.3, label=name)
+        furthest = furthest if colour == GIVEN else max(furthest, float((np.abs(place) + reach).max()))
+    limit = BEYOND * furthest
+    axes.set_xlim(-limit, limit)
+    for row, place in zip(rows, (np.array([item.given for item in changes]) - centre) / sd, strict=True):
+        if abs(place) > limit:
+            side = "right" if place > 0.0 else "left"
+            text = f"given at {format_signed(place, 0)}"
+            axes.text(np.sign(place) * 0.99 * limit, row + 0.24, text, color=GIVEN, ha=side, va="bottom", fontsize=6.5)
     axes.axvline(0.0, color="black", linewidth=0.5)
     axes.set_yticks(rows, [item.name for item in changes])
-    axes.set_ylim(-0.6, len(changes) - 0.4)
-    axes.set_xlabel("distance from the given value [prior widths]")
+    axes.set_ylim(-0.6, len(changes) - 0.2)
+    axes.set_xlabel("distance from the value fitted without the named causes [its standard deviations]")
     axes.grid(visible=False, axis="y")
-    axes.legend(loc="upper right", ncols=3, bbox_to_anchor=(1.0, 1.14))
+    axes.legend(loc="lower right", ncols=3, bbox_to_anchor=(1.0, 1.0))
     return figure

@@ -34,14 +34,27 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.link_shapes import equivalent_box, link_shapes
 from bayesid.robot.robot import Robot
 
-__all__ = ["VIEWS", "draw_box", "draw_sticks", "manoeuvre", "plot_manoeuvre", "plot_robot", "robot_pose", "sticks_of"]
+__all__ = [
+    "BASE",
+    "VIEWS",
+    "draw_box",
+    "draw_sticks",
+    "manoeuvre",
+    "plot_manoeuvre",
+    "plot_robot",
+    "robot_pose",
+    "sticks_of",
+    "surface_of",
+]
 
 
 CURVE_POINTS = 600  # number of points of a curve over time
 FACE = 0.08  # longest edge of a face that is drawn, relative to the size of the robot
 GLASS = 0.3  # opacity of a box in place of the base's shape, which may hold other links
 LIGHT = np.array([0.3, -0.5, 0.81])  # direction of the light that shades shapes
-BASE, LINKS = "#8fbcdb", ("#e0b04c", "#b9b9b9")  # colours of the base and, by turns, of the links
+LINKS = ("#e0b04c", "#b9b9b9")  # colours of the links, by turns
+BASE = "#8fbcdb"
+"""Colour of the base."""
 
 VIEWS = (("view along −z", 0, 1), ("view along y", 0, 2), ("view along −x", 1, 2))
 """Title, axis along and axis up of each projection."""
@@ -175,24 +188,8 @@ def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, 
     elif not hasattr(ax, "zaxis"):
         raise InputError("the axes are flat", remedy='Create them with figure.add_subplot(projection="3d")')
     state = given.reshape(1, -1)
-    pose = kinematics(robot, JointState(state, 0.0 * state, 0.0 * state)).pose[0]
-    faces, colours, links = [], [], []
-    for shape in link_shapes(robot):
-        link = robot.link(shape.link)
-        placed = (np.eye(4) if link.joint < 0 else pose[link.joint]) @ link.placement
-        faces.append(shape.triangles @ placed[:3, :3].T + placed[:3, 3])
-        links.append((link.joint, GLASS if link.joint < 0 and shape.source == "box" else 1.0))
-    everything = np.concatenate(faces)
-    low, high = everything.min(axis=(0, 1)), everything.max(axis=(0, 1))
-    # matplotlib draws the farthest first, by the middle of each face: large ones would hide what is before them
-    longest = FACE * float((high - low).max())
-    faces = [_split(part, longest) if alpha == 1.0 else part for part, (_, alpha) in zip(faces, links, strict=True)]
-    for corners, (joint, alpha) in zip(faces, links, strict=True):
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        bright = np.abs(normal @ LIGHT) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
-        shade = np.outer(0.55 + 0.45 * bright, to_rgb(BASE if joint < 0 else LINKS[joint % 2]))
-        colours.append(np.column_stack([shade, np.full(len(shade), alpha)]))
-    drawn, shades = np.concatenate(faces), np.concatenate(colours)
+    drawn, shades = surface_of(robot, kinematics(robot, JointState(state, 0.0 * state, 0.0 * state)).pose[0])
+    low, high = drawn.min(axis=(0, 1)), drawn.max(axis=(0, 1))
     shown = {"linewidths": 0.0, "antialiased": False, "rasterized": True}
     ax.add_collection3d(Poly3DCollection(drawn, facecolors=shades, **shown))
     middle, reach = 0.5 * (low + high), 0.5 * np.maximum(high - low, 0.2 * float((high - low).max()))
@@ -202,6 +199,30 @@ def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, 
         ax.locator_params(axis=axis, nbins=4)
     ax.set_box_aspect(reach, zoom=1.0)
     return ax.get_figure(root=True)
+
+
+def surface_of(robot: Robot, pose: Floats) -> tuple[Floats, Floats]:
+    """Return the triangles (T, 3, 3) of a robot in a pose (joints, 4, 4), base frame, and their colours (T, 4).
+
+    Whoever draws the farthest first, by the middle of each face, hides what is behind: large faces are cut for that.
+    """
+    placed, looks = [], []
+    for shape in link_shapes(robot):
+        link = robot.link(shape.link)
+        carrier = (np.eye(4) if link.joint < 0 else pose[link.joint]) @ link.placement
+        placed.append(shape.triangles @ carrier[:3, :3].T + carrier[:3, 3])
+        looks.append((link.joint, GLASS if link.joint < 0 and shape.source == "box" else 1.0))
+    everything = np.concatenate(placed)
+    longest = FACE * float(np.ptp(everything, axis=(0, 1)).max())
+    faces, colours = [], []
+    for part, (joint, alpha) in zip(placed, looks, strict=True):
+        corners = _split(part, longest) if alpha == 1.0 else part
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        bright = np.abs(normal @ LIGHT) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
+        shade = np.outer(0.55 + 0.45 * bright, to_rgb(BASE if joint < 0 else LINKS[joint % 2]))
+        faces.append(corners)
+        colours.append(np.column_stack([shade, np.full(len(shade), alpha)]))
+    return np.concatenate(faces), np.concatenate(colours)
 
 
 def _split(triangles: Floats, longest: float) -> Floats:
