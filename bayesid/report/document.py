@@ -266,7 +266,7 @@ def _least_filled(ends: Sequence[tuple[int, float]], flows: Sequence[bool]) -> f
 
 def literal(text: str) -> str:
     """Return plain text as a string literal of Typst, with no line broken within a quantity (`QUANTITY`)."""
-    clean = QUANTITY.sub(lambda found: found[0].replace(" ", "\u00a0"), text.encode("utf-8", "replace").decode("utf-8"))
+    clean = QUANTITY.sub(lambda match: match[0].replace(" ", "\u00a0"), text.encode("utf-8", "replace").decode("utf-8"))
     escaped = clean.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return '"' + re.sub(r"[\x00-\x09\x0b-\x1f\x7f]", " ", escaped) + '"'
 

@@ -160,7 +160,7 @@ def sensitivity_rows(result: Diagnosis) -> Rows:
 
 def _weighed(result: Diagnosis) -> set[str]:
     """Return the causes of the most probable sets."""
-    return {cause for item in result.probabilities.sets[:SETS] for cause in item.causes}
+    return {cause for weighed in result.probabilities.sets[:SETS] for cause in weighed.causes}
 
 
 def bound_rows(bounds: dict[str, tuple[PhysicalBound, ...]]) -> Rows:

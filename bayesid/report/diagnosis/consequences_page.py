@@ -43,7 +43,7 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
     named, changes = result.named, result.parameter_changes
     document.section("Consequences" if named else "Inertial parameters and the disturbance")
     shown = of_most_moved_body(changes)
-    if rest := [item for item in changes if item not in shown]:
+    if rest := [change for change in changes if change not in shown]:
         add_changes(document, result, rest, "The other inertial parameters, ± sd.")
     if named and changes:
         document.figure(

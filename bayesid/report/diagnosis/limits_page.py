@@ -35,7 +35,7 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
     """Add the manoeuvres to fly, the candidates out of reach, the pairs that imitate each other, and the method."""
     document.section(NEXT)
     stated = action_sentence(result)  # on the first page
-    document.items([*(item for item in advice_sentences(result) if item not in stated), *([advice] if advice else [])])
+    document.items([*(text for text in advice_sentences(result) if text not in stated), *([advice] if advice else [])])
     _add_unseen(document, result)
     if pairs := result.inseparable_pairs[:PAIRS]:
         document.table(

@@ -46,13 +46,13 @@ def _pairs(result: Diagnosis, identification: Identification) -> Iterator[tuple[
     quantities = [
         (mean, sd) for body in identification.bodies.values() for mean, sd in zip(body.mean, body.sd, strict=True)
     ]
-    for item, (mean, sd) in zip(result.parameter_changes, quantities, strict=True):
-        if item.fitted_sd > 0.0:
-            yield item.name, float(mean), float(sd), item.fitted, item.fitted_sd
+    for change, (mean, sd) in zip(result.parameter_changes, quantities, strict=True):
+        if change.fitted_sd > 0.0:
+            yield change.name, float(mean), float(sd), change.fitted, change.fitted_sd
     fitted = {
-        f"{label}.{item.quantity.name}": item
+        f"{label}.{amplitude.quantity.name}": amplitude
         for label in result.after.labels
-        for item in amplitudes_of(result.after, label)
+        for amplitude in amplitudes_of(result.after, label)
     }
     for row in identification.effect_quantities:
         name = f"{row.label}.{row.name}"

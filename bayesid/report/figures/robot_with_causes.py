@@ -128,15 +128,15 @@ def _directions(arrows: Sequence[Floats]) -> Floats:
     number = np.arange(DIRECTIONS)
     height, angle = (number + 0.5) / DIRECTIONS, math.pi * (3.0 - math.sqrt(5.0)) * number
     radius = np.sqrt(1.0 - height**2)
-    found = [np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)]
+    eyes = [np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)]
     turn = np.linspace(0.0, math.pi, TURNS, endpoint=False)
     for arrow in arrows:
         first, second = np.linalg.svd(arrow[None])[2][1:]
-        found.append(np.outer(np.cos(turn), first) + np.outer(np.sin(turn), second))
+        eyes.append(np.outer(np.cos(turn), first) + np.outer(np.sin(turn), second))
         crossed = np.array([np.cross(arrow, other) for other in arrows])
         lengths = np.linalg.norm(crossed, axis=1)
-        found.append(crossed[lengths > 1e-6] / lengths[lengths > 1e-6, None])
-    return np.concatenate(found)
+        eyes.append(crossed[lengths > 1e-6] / lengths[lengths > 1e-6, None])
+    return np.concatenate(eyes)
 
 
 def _looking_along(eye: Floats) -> Floats:
@@ -185,7 +185,7 @@ def _draw_scales(
     metres = _round_below(SCALE * size)
     axes.plot([ends[0], ends[0] + metres], [height, height], color="black", linewidth=1.2)
     axes.annotate(f"{format_number(metres, 1)} m", (ends[0], height), (0, -2), textcoords="offset points", va="top")
-    sized = {unit: item for unit, item in lengths.items() if format_unit(unit)}  # the others are directions alone
+    sized = {unit: length for unit, length in lengths.items() if format_unit(unit)}  # the others are directions alone
     for place, (unit, (largest, metre)) in enumerate(sized.items()):
         value, at = _round_below(largest * SCALE / ARROW), height - GAP * size * 1.5 * place
         arrow = {"arrowstyle": "-|>", "color": COLOURS[0], "linewidth": 1.8, "shrinkA": 0.0, "shrinkB": 0.0}
