@@ -1,12 +1,13 @@
 """One flight recorded at 10 and at 1,000 Hz with noise per root hertz alike."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
+from bayesid.diagnosis import diagnose
 from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -28,11 +29,11 @@ BODIES = slice(0, 10)
 FIRST_RATE = (0.01, -0.02, 0.015)
 
 
-def flown() -> dict[str, np.ndarray]:
-    """Return what sensors and encoders read without noise at the fine rate, by MuJoCo."""
+def flown(**hidden: Any) -> dict[str, np.ndarray]:
+    """Return what sensors and encoders read without noise at the fine rate, by MuJoCo with something hidden."""
     motion = mj.smooth_motion(2, END, seed=11, amplitude=0.3, frequencies=(0.05, 0.08), ramp=8.0)
     time = np.arange(0.0, END + 0.001, 0.02)
-    truth = mj.TruthModel(PLANAR, accel_position=POINT).run(motion, time, rate0=FIRST_RATE, step=0.02)
+    truth = mj.TruthModel(PLANAR, accel_position=POINT, **hidden).run(motion, time, rate0=FIRST_RATE, step=0.02)
     fine = np.arange(0.0, END, 1.0 / FINE)
     curves = {f"position.joint{index + 1}": truth.position[:, index] for index in range(2)}
     curves |= {f"rate.{axis}": truth.rate[:, index] for index, axis in enumerate("xyz")}
@@ -49,8 +50,8 @@ class Fitted(NamedTuple):
     rate_sd: np.ndarray
 
 
-def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
-    """Return what is learnt at a rate, by Laplace's approximation."""
+def study_at(readings: dict[str, np.ndarray], rate: float) -> tuple[Model, list[Manoeuvre]]:
+    """Return the model and the recording at a rate."""
     rng, fine, noise = np.random.default_rng(3), np.arange(0.0, END, 1.0 / FINE), float(np.sqrt(rate / 2.0))
     count = round(FINE / rate)
     time, channels = fine.reshape(-1, count).mean(axis=1), {}
@@ -64,13 +65,20 @@ def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
     sensors = (Sensor(SensorKind.RATE, white), Sensor(SensorKind.ACCEL, white, position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
     moved = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODERS * noise})
-    posterior = Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, moved)])
+    return Model(robot, sensors, (prior,)), [Manoeuvre(recording, moved)]
+
+
+def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
+    """Return what is learnt at a rate, by Laplace's approximation."""
+    model, manoeuvres = study_at(readings, rate)
+    posterior = Posterior.of(model, manoeuvres)
     start = posterior.starting_point()
     mode = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, 1e-9, 200).x
     slopes = posterior.jacobian(mode)
     sd = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     first = np.asarray(posterior.unknowns.values_at(mode).rate)[0]
-    return Fitted(mode, sd, first, np.hypot(posterior.model.rate_sigma * sd[-3:], first_rate_sd(robot, moved)))
+    unseen = first_rate_sd(model.robot, manoeuvres[0].motion)
+    return Fitted(mode, sd, first, np.hypot(posterior.model.rate_sigma * sd[-3:], unseen))
 
 
 def test_bodies_are_as_well_known_at_any_rate():
@@ -82,3 +90,32 @@ def test_bodies_are_as_well_known_at_any_rate():
     assert (np.abs(fast.rate - slow.rate) / slow.rate_sd).max() < 0.1
     for fitted in (slow, fast):
         assert (np.abs(fitted.rate - FIRST_RATE) / fitted.rate_sd).max() < 4.0
+
+
+LATE = 0.005  # delay of the gyro [s]
+WHEEL = mj.Rotor((0.0, 0.006, 0.003), (0.1, 0.0, 0.0))
+PANEL = mj.panel(0.5, (1.0, 0.4), (0.0, 0.5, 0.1), (1.0, 0.0, 0.2), 0.9)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "late"),
+    [
+        ({}, 0.0),
+        ({"rotor": WHEEL}, 0.0),
+        ({}, LATE),
+        ({"appendages": [PANEL]}, 0.0),
+        ({"flexible": [mj.Flexibility("joint2", 2.0)]}, 0.0),
+    ],
+    ids=["nothing", "wheel", "late gyro", "panel at 0.9 Hz", "flexible joint"],
+)
+def test_a_verdict_is_the_same_at_any_rate(hidden, late):
+    readings = flown(**hidden)
+    for axis in "xyz":
+        rate = readings[f"rate.{axis}"]
+        readings[f"rate.{axis}"] = rate[np.maximum(np.arange(len(rate)) - round(late * FINE), 0)]
+    slow, *others = (diagnose(*study, 1) for study in (study_at(readings, rate) for rate in (10.0, 100.0, FINE)))
+    assert bool(slow.verdict.causes) == bool(hidden or late)
+    for fast in others:
+        assert (fast.verdict.status, fast.verdict.causes) == (slow.verdict.status, slow.verdict.causes)
+        for name, probability in slow.probabilities.inclusion.items():
+            assert fast.probabilities.inclusion[name] == pytest.approx(probability, abs=0.02), name
