@@ -186,7 +186,7 @@ def _motion_sentence(posterior: Posterior) -> str:
     jumps = sum(len(joint.jumps) for motion in measured for joint in motion.joints)
     free = f" that permits {counted(jumps, 'jump')} of acceleration or jerk" if jumps else ""
     return (
-        f"The motion of the joints is a smoothing spline{free} through the samples of the encoders (last table); its "
+        f"The motion of the joints is a smoothing spline of the encoder samples{free} (table below); its "
         f"uncertainty is propagated into the noise of the sensors, {reach}."
     )
 

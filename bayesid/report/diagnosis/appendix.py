@@ -42,7 +42,10 @@ GLOSSARY = (
     ("log BF", "Natural logarithm of the Bayes factor of a candidate alone over none."),
     ("probability", "Of a set: evidence times prior over the sum of all sets. Of a cause: sum over the sets with it."),
     ("class", "Causes whose effects on the model these data cannot distinguish; they share a probability."),
-    ("something unknown", "Any candidate outside the catalogue: a smooth torque, force or sensor error, or a pulse."),
+    (
+        "something unknown",
+        "Any candidate outside the catalogue: a smooth torque, force or sensor error, a pulse or a burst.",
+    ),
     (
         "p, adjusted",
         "Probability that noise alone makes the most significant of all tests at least this significant.",
@@ -50,7 +53,7 @@ GLOSSARY = (
     ("SNR", "Signal-to-noise ratio: square root of a candidate's decrease of chi-square minus its degrees of freedom."),
     ("power", "Probability that a candidate with a size drawn from its prior would have raised the alarm."),
     ("95 % limit", "Value below which the magnitude of a quantity lies with a probability of 95 %."),
-    ("cosine", "Correlation of the signals of two causes, without the part that the model's unknowns can explain."),
+    ("cosine", "Correlation of the signals of two causes, apart from what the model's unknowns can explain."),
     ("left-out log score", "Logarithm of the density of a recording under the model fitted to the other recordings."),
     ("without, with", "Fitted with the present model, and with the named causes added to it."),
 )

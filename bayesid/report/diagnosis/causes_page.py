@@ -46,7 +46,7 @@ def add_causes(document: Document, result: Diagnosis) -> None:
             "with its inertia about its centre of mass; all other vectors are in base or sensor axes.",
         )
     elif result.named:
-        document.paragraph("The named causes have no free parameter: physics fixes their size.")
+        document.paragraph("The named causes have no free parameter: physics determines their size.")
     drawn = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, row.name))[:BARS]
     document.figure(
         figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),

@@ -49,8 +49,8 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
         document.figure(
             figures.parameter_forest(changes),
             "Inertial parameters relative to their values without the named causes; bars contain 95 %. The axis is "
-            "limited to the fits: a prior that reaches beyond it is a line over the whole width. A shift beyond the "
-            "bars is an error that would otherwise have gone unnoticed.",
+            "limited to the fits: a prior that reaches beyond it is drawn as a line over the whole width. A shift beyond "
+            "the bars is an error that would otherwise have gone unnoticed.",
         )
     _add_disturbance(document, result)
 
@@ -64,9 +64,9 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
     if result.verdict.status is Status.ADEQUATE or (named and not (moves or result.after.faults)):
         return
     document.paragraph(
-        f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
-        "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
-        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included."
+        f"A disturbance of the base that would explain the residual{' without the named causes' if named else ''}: "
+        "a torque about, and a force through, the common centre of mass, smooth in time, with a size estimated from "
+        "the data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included."
         + (f" {wrench_sentence(wrench)}" if named else "")  # the first page states it where nothing is named
     )
     if wrench.signal_to_noise > 0.0:

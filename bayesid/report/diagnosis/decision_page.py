@@ -54,8 +54,8 @@ def add_decision(document: Document, result: Diagnosis, record: str | None = Non
             document,
             result,
             of_most_moved_body(result.parameter_changes),
-            "Inertial parameters, ± sd: as given, fitted without and with the named causes, and shift in sd without "
-            "them."
+            "Inertial parameters, ± sd: as given, fitted without and with the named causes, and the shift between the "
+            "two in sd of the fit without them."
             if result.named
             else "Inertial parameters, ± sd: as given, and fitted with the present model.",
         )
@@ -72,7 +72,7 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
         for names in verdict.ambiguous_with
     ]
     listed = "; ".join(" ".join(row) for row in probability_rows(result, CLASSES))
-    entries.append(("Probable", f"{listed}; each whatever accompanies it."))
+    entries.append(("Probable", f"{listed}; each alone or with others."))
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         entries.append(("Unexplained", wrench_sentence(result.unexplained)))
     if result.torques is not None:
@@ -92,8 +92,7 @@ def _picture_text(result: Diagnosis) -> str:
     if not result.named:
         return "Left: the robot at the start."
     return (
-        "Left: the robot at the start, viewed so that arrows have their full length, with the cause in blue where it "
-        "acts."
+        "Left: the robot at the start, viewed so that no arrow is foreshortened, with the cause in blue where it acts."
     )
 
 
@@ -150,7 +149,7 @@ def conditions_text(hypothesis: Hypothesis) -> str:
     noise = f"noise of {', '.join(coloured)} coloured" if coloured else "noise white"
     if hypothesis.faults:
         noise += f", with {', '.join(fault.label for fault in hypothesis.faults)}"
-    return f"{links}, geometry exact, {noise}; bodies rigid except for the causes considered.".capitalize()
+    return f"{links}, geometry exact, {noise}; bodies rigid except as described by the causes considered.".capitalize()
 
 
 def probability_rows(result: Diagnosis, most: int) -> Rows:

@@ -167,8 +167,8 @@ def alarm_sentence(result: Diagnosis) -> str:
     found = "no alarm is raised" if alarm.silent else "an alarm is raised"
     return (
         f"Of {alarm.tests} tests of the residuals of the present model, the most significant is that for "
-        f"{alarm.loudest} (p {relation(format_p_value(alarm.p_value))}, adjusted for all tests). An alarm requires a "
-        f"value below {alarm.level:g}: {found}."
+        f"{alarm.loudest} (p {relation(format_p_value(alarm.p_value))}, adjusted for all tests). The alarm "
+        f"threshold is {alarm.level:g}: {found}."
     )
 
 
@@ -237,7 +237,7 @@ def wrench_sentence(wrench: DisturbingWrench) -> str:
     """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
         return "A free torque and force on the base would explain no more than noise alone."
-    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "The axes in which its direction is fixed are undecided."
+    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes its direction is fixed is undecided."
     strength = format_fixed(wrench.signal_to_noise, 1)
     return (
         "Modelled as a free torque and force on the base, the disturbance has a signal-to-noise ratio of "

@@ -42,7 +42,7 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
             ["cause", "other", "largest cosine:", "smallest cosine:", "separable at SNR:", ""],
             pair_rows(pairs),
             ("Named causes" if result.named else "The most probable causes")
-            + " and those that imitate them best, without the part that the model's unknowns explain. If the largest "
+            + " and those that imitate them best, apart from what the model's unknowns explain. If the largest "
             "cosine is near one, some effect of one cause can be mistaken for some effect of the other; if the "
             "smallest is also near one, these manoeuvres cannot separate the two at all. From the given "
             "signal-to-noise ratio, either is distinguished from the other in 95 % of all cases.",
@@ -54,9 +54,9 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
 def _add_unseen(document: Document, result: Diagnosis) -> None:
     if hidden := result.unseen_candidates:
         document.paragraph(
-            "These manoeuvres could hardly have detected the following candidates: with sizes drawn from their priors, "
-            "they would have raised no alarm in more than half of all cases. Their absence from the verdict is weak "
-            "evidence that they are not at work."
+            "These manoeuvres could hardly have detected the following candidates: with a size drawn from its "
+            "prior, each would have raised no alarm in more than half of all cases. Their absence from the verdict is "
+            "weak evidence that they are not at work."
         )
         document.table(
             ["candidate", "power:", "95 % limits on its magnitude"],
@@ -65,8 +65,8 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
         )
     elif result.verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
         document.paragraph(
-            "Every candidate of known power, with its size drawn from its prior, would have raised the alarm in at "
-            "least half of all cases: these manoeuvres are sufficient."
+            "Every candidate whose power is known, with its size drawn from its prior, would have raised the alarm in "
+            "at least half of all cases: these manoeuvres are sufficient."
         )
 
 
@@ -90,8 +90,8 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     """Return how the verdict was reached."""
     prior, probabilities, settings = result.probabilities.prior, result.probabilities, result.settings
     yield (
-        f"An alarm is raised if the most significant of {result.alarm.tests} tests is as significant as noise alone "
-        f"makes it in less than {100.0 * result.alarm.level:g} % of cases; all dependence between the tests is "
+        f"An alarm is raised if noise alone would make the most significant of {result.alarm.tests} tests this "
+        f"significant in less than {100.0 * result.alarm.level:g} % of cases; all dependence between the tests is "
         "included."
     )
     yield (
@@ -107,21 +107,21 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         "same size are equally probable a priori."
     )
     yield (
-        "The scale of those amplitudes of a cause that share a unit is itself unknown: every power of ten between the "
-        "resolution of the data and the physical bound is equally probable."
+        "The common scale of the amplitudes of a cause that share a unit is itself unknown: every power of ten between "
+        "the resolution of the data and the physical bound is equally probable."
     )
     yield (
         f"Causes are named if the class of each has a probability of {settings.named_from:g} or more. They explain the "
-        f"data if the candidates outside the catalogue have less than {settings.remainder_from:g}, and a part of the "
-        f"data if those have more. Otherwise the verdict is ambiguous if two to {settings.most_alternatives} "
+        f"data if the candidates outside the catalogue have less than {settings.remainder_from:g}, and only a part of "
+        f"the data otherwise. Otherwise the verdict is ambiguous if two to {settings.most_alternatives} "
         f"alternatives together reach {format_number(100.0 * settings.covered)} %, and unresolved if more are needed. "
-        "It is unknown if the candidates outside the catalogue have the majority of the probability."
+        "The verdict is unknown if the candidates outside the catalogue have more than half of the probability."
     )
     if result.bodies_fixed:
         yield (
             "Every fit of the present model drove its bodies to values that their prior all but excludes. The bodies "
-            "are therefore fixed at the prior's centre, and the effect of each candidate is computed along the motion "
-            "in the data."
+            "are therefore fixed at the prior's centre, and the effect of each candidate is computed along the "
+            "measured motion."
         )
     if result.bounded is not None:
         yield result.bounded

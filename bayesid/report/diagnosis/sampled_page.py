@@ -73,8 +73,8 @@ def add_measured(document: Document, result: Diagnosis, fits: Sequence[Sequence[
     strongest = result.strongest_recording
     document.section("Measured and simulated")
     document.paragraph(
-        f"A figure compares the readings of {result.recordings[strongest]} with those of the "
-        f"{'model with the named causes' if result.named else 'present model'} at its fit."
+        f"The figure compares the readings of {result.recordings[strongest]} with those that the fitted "
+        f"{'model with the named causes' if result.named else 'present model'} predicts."
     )
     document.figure(
         figures.measured_against_simulated(fits[strongest]),
