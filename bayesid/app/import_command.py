@@ -1,4 +1,4 @@
-"""Command ``bayesid import``, which makes a recording from a bag of ROS."""
+"""Command ``bayesid import``, which makes a recording from a ROS bag."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["run"]
 
 
 def run(
-    bag: Annotated[Path, typer.Argument(metavar="BAG", help="File .bag of ROS 1, or folder of ROS 2.")],
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="ROS 1 file (.bag) or ROS 2 folder.")],
     output: Output,
     joints: Annotated[
         list[str] | None, typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState; repeatable.")
@@ -72,7 +72,7 @@ def run(
         ),
     ] = None,
 ) -> Iterator[str]:
-    """Convert a bag of ROS 1 or ROS 2 into a recording: NAME.csv, and its origin in NAME.import.json."""
+    """Convert a ROS 1 or ROS 2 bag into a recording: NAME.csv, and its origin in NAME.import.json."""
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_conventions import imported_as
     from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag

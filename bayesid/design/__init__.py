@@ -1,4 +1,4 @@
-"""Design of the excitation: manoeuvres chosen by the posterior they lead to, within the limits of the robot.
+"""Design of the excitation: manoeuvres chosen by the posterior that they would give, within the limits of the robot.
 
 Data flow in one direction: `trajectories` -> `plan` (motion of the robot and information of its sensors) -> `criteria`
 and `motion_limits` -> `design_problem` (compiled, with gradients) -> `trajectory_search` -> `design_result` (each

@@ -354,8 +354,8 @@ class Separation(Criterion):
     must contain the rivals.
 
     A direction that all other unknowns imitate in every manoeuvre, such as a constant force together with the bias of
-    an accelerometer, would be the worst of each manoeuvre, whatever the manoeuvre does for the others. `adapted` omits
-    such directions.
+    an accelerometer, would be the worst direction of every manoeuvre and hide how these differ in the others. `adapted`
+    omits such directions.
 
     Parameters
     ----------

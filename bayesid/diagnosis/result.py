@@ -135,7 +135,7 @@ class Diagnosis(ShortForm):
 
     @property
     def settings(self) -> DiagnosisSettings:
-        """Thresholds by which it decided."""
+        """Thresholds of the decisions."""
         return self.search.settings
 
     @property
@@ -266,7 +266,7 @@ class Diagnosis(ShortForm):
         return next((tuple(members) for members in self.classes if cause in members), (cause,))
 
     def probability_of(self, names: Sequence[str]) -> float:
-        """Return the probability that all given causes are at work, whatever accompanies them; of none, of nothing.
+        """Return the probability that all given causes are at work, alone or with others; without any, that none is.
 
         Parameters
         ----------
@@ -286,7 +286,7 @@ class Diagnosis(ShortForm):
         )
 
     def cause_probability(self, cause: str) -> float:
-        """Return the probability that a cause or one of its equivalents is at work, whatever accompanies it."""
+        """Return the probability that a cause or one of its equivalents is at work, alone or with others."""
         return self.probabilities.of_any(self.class_of(cause))
 
     def sizes_of(self, cause_set: CauseSet) -> list[GroupSize]:

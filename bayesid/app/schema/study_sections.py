@@ -324,7 +324,7 @@ class OrbitSection(Section):
     argument_of_perigee : float, optional
         Argument of perigee [rad].
     sun : (3,), optional
-        Unit vector from the Earth to the Sun, in the axes of node, along-orbit direction and orbit normal.
+        Unit vector from the Earth to the Sun, node axes: x to the ascending node, z along the orbit normal.
     """
 
     radius: Number

@@ -291,13 +291,13 @@ class JointBacklash(_DisplacedMotion, OnJoint):
     """Play of a joint: the link is offset from the encoder, at one side of a gap, and occasionally crosses the gap.
 
     One of two mechanisms presses it to a side. Without friction it is the torque through the joint: the flank that
-    drives the link presses it from behind, so that it lags in the direction of its acceleration. When the torque
-    changes its sign, the link coasts from one flank to the other; the duration follows from the slope of the torque
-    and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
-    the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link lags
-    in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits
-    until the gap is crossed, or the link moves on evenly and the encoder leaps, which appears as in the smoothed
-    recording. In a gear with some friction, each mechanism has a share.
+    drives the link pushes it from behind, so that it trails the encoder in the direction of its acceleration. When the
+    torque changes its sign, the link coasts from one flank to the other; the duration follows from the slope of the
+    torque and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
+    the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link trails
+    in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits until
+    the gap is crossed, or the link moves on evenly and the encoder leaps; the leap has the form that it has in the
+    smoothed recording. In a gear with some friction, each mechanism contributes a part.
     """
 
     name = "joint-backlash"

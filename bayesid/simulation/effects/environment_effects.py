@@ -73,8 +73,8 @@ class GravityGradient(Effect):
 
     name = "gravity-gradient"
     summary = (
-        "Gravity is stronger on parts nearer the Earth. The difference over the robot's extent causes a torque, "
-        "and an accelerometer away from the centre of mass measures it."
+        "Gravity is stronger on parts nearer the Earth. This difference over the robot's extent causes a torque and "
+        "a reading of an accelerometer that is not at the centre of mass."
     )
     separated_by = (
         "It follows the direction of the Earth: repeat with the base in a different attitude, or with the arm "
@@ -347,7 +347,7 @@ class ThrusterLeak(Effect):
 class RotationalDrag(Effect):
     """Torque against the base's rotation, proportional to its rate about each axis, as from the air of a laboratory.
 
-    The prior of 0.1 N m s brakes a body of 1 kg m2 within ten seconds.
+    The prior of 0.1 N m s brakes a body of 1 kg m2 with a time constant of ten seconds.
     """
 
     name = "rotational-drag"

@@ -268,7 +268,7 @@ def wheel_bound(robot: Robot) -> PhysicalBound:
     size = RobotSize.of(robot)
     radius = RIM_RADIUS * size.length
     reason = (
-        f"The rotors of the wheels are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg and run at "
-        f"{RIM_SPEED:g} m/s at their rims of {radius:.2g} m radius."
+        f"The rotors of the wheels have at most {100.0 * ROTORS:g} % of the robot's {three_digits(size.mass)} kg and "
+        f"a rim speed of {RIM_SPEED:g} m/s at a radius of {radius:.2g} m."
     )
     return PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason)

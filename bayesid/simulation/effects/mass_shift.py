@@ -43,9 +43,9 @@ class MassShift(Effect):
 
     The motion itself is omitted: a mass that does not move along a line through the common centre of mass
     turns the base while it moves, by about ``m a x (b - a)`` divided by the inertia, where a and b are taken from that
-    centre. This angle does not depend on how fast the mass moves. On a base that turns it changes the rates afterwards
-    by as much as the moments do, and a pulse of torque at the same instant stands for it where the rate alone is
-    measured. The shock on an accelerometer at the instant is also omitted.
+    centre. This angle does not depend on how fast the mass moves. On a rotating base it changes the subsequent rates
+    by as much as the moments do; where only the rate is measured, a pulse of torque at the same instant can represent
+    it. The shock on an accelerometer at the instant is also omitted.
 
     Parameters
     ----------

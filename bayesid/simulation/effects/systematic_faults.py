@@ -244,7 +244,7 @@ class SensorScale(_FaultByAxis):
 
 @register
 class SensorMisalignment(_FaultByAxis):
-    """Rotation of a sensor of a vector against its stated mounting; the prior is two degrees per axis."""
+    """Rotation of a vector sensor relative to its stated mounting; the prior is two degrees per axis."""
 
     name = "SENSOR-misalignment"
     summary = "The {instrument} is rotated relative to its stated mounting."
@@ -311,12 +311,12 @@ class AttitudeMisalignment(SystematicFault):
     The reading at the first sample determines it if the recording's initial attitude is exact. If that attitude is
     unknown, its error absorbs the rotation at that instant. The remainder appears while the base rotates about another
     axis, as the angle of rotation times the misalignment, and where the recorded rate, or the direction of the Earth in
-    a gravity gradient, determines the true axes. The same error in all recordings, with separate initial attitudes, is
-    more probably a misalignment than any of those.
+    a gravity gradient, determines the true axes. The same error in several recordings with
+    separate initial attitudes is more probably a misalignment than an error of each of these attitudes.
     """
 
     name = "attitude-misalignment"
-    summary = "The star tracker is rotated from its stated mounting: every measured attitude has the same error."
+    summary = "The star tracker is rotated relative to its stated mounting: every measured attitude has the same error."
     separated_by = (
         "It is the same rotation in base axes at every attitude: rotate the base by large angles about each axis."
     )

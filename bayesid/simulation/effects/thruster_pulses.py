@@ -44,11 +44,12 @@ class PulseTrain(NamedTuple):
 class ThrusterPulses(Effect):
     """Force and torque about the base origin, base axes, of a thruster that fires in a regular train of pulses.
 
-    What the pulses have given so far follows in closed form from the time on: with ``A`` that time, signs included,
-    ``x = A (T - c x F) + u`` is the angular momentum received about the common centre of mass, where
-    ``u' = -w x x + A c' x F``. Taken from the base as a momentum it is exact for pulses shorter than a step.
+    The momentum received so far follows in closed form from the accumulated firing time: with ``A`` that time, signs
+    included, ``x = A (T - c x F) + u`` is the angular momentum received about the common centre of mass, where
+    ``u' = -w x x + A c' x F``. Treated as a momentum taken from the base, it is exact even for pulses shorter than a
+    step.
 
-    The train is a constant of the effect; in force and torque it is linear.
+    The times of the pulses are constants of the effect, which is linear in force and torque.
 
     Parameters
     ----------

@@ -206,13 +206,13 @@ class WheelLatency(OnWheel):
 
 @register
 class WheelImbalance(OnWheel):
-    """Imbalance of a wheel, which shakes the base at a multiple of its recorded speed, in each recording at a phase.
+    """Imbalance of a wheel, which shakes the base at a multiple of its recorded speed; the phase differs by recording.
 
     The static imbalance is a first moment of mass off the axis: its force acts at the wheel's place, and turns the base
     about the common centre of mass. The dynamic one is the momentum across the axis per speed. The line has order one
     unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed given by the
     order. In the readings the line is as sharp as the smoothed speed, and the influence of the base's rotation on it is
-    neglected. Where the wheel turns faster than half the rate of the samples it is no candidate: averages over blocks
+    neglected. Where the wheel turns faster than half the sampling rate, it is not a candidate: averages over blocks
     contain no such line, and ``blocks_per_second = 0`` uses all samples.
 
     Parameters
