@@ -116,14 +116,14 @@ def write_validation(folder: Path, output: Path) -> None:
             ("Where", _where(goals)),
             *_caution(summaries),
             *_without(folder, summaries),
-            ("See also", "manual.pdf: the manual. README.md: goals by study. Names of studies lead to their reports."),
+            ("See also", "manual.pdf: the manual. README.md: goals by study. Study names link to their reports."),
         ],
     )
     for file in ("manual.pdf", "README.md"):
         document.link(file, file)
     if goals:
         document.figure(
-            verdict_figure(goals), "Number of goals of each study by verdict, in the order of the subjects."
+            verdict_figure(goals), "Number of goals of each study by verdict, studies in the order of their subjects."
         )
     for verdict in ORDER:
         if verdict is Verdict.PASS:

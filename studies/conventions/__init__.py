@@ -1,4 +1,4 @@
-"""Conventions: how often wrong ones are named, and how often right studies are taken for wrong."""
+"""Conventions: how often wrong ones are named, and how often correct studies are reported as wrong."""
 
 from studies.conventions.report import STUDY
 

@@ -1,4 +1,4 @@
-"""Report on wrong conventions: how often they are named, and how often right studies are taken for wrong."""
+"""Report on wrong conventions: how often they are named, and how often correct studies are reported as wrong."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
     full = len(wrong) > 100
     return Report(
         title="Wrong conventions",
-        subtitle="Detection of axes, signs, orders and units that telemetry does not state",
+        subtitle="Detection of undeclared axes, signs, orders and units of telemetry",
         question="Are common mistakes in telemetry named, without false reports on correct studies?",
         answer=f"{sum(row.right for row in wrong)} of {len(wrong)} studies with a mistake are corrected by the "
         f"reported remedy. {sum(row.alarms for row in right)} of {sum(row.looks for row in right)} checks of correct "
@@ -142,9 +142,10 @@ def _report(outcomes: Sequence[Outcome]) -> Report[Sequence[Outcome]]:
             robot=f"{', '.join(ROBOTS)} with three and four joints, and in the full run {len(DRAWN)} drawn at random "
             "with two to seven.",
             manoeuvre="Smooth motions of 60 s, in the full run of three sizes; 150 s with a hidden cause.",
-            sensors=f"Rate, acceleration, attitude and encoders; in the full run with noise of {NOISES}.",
+            sensors=f"Rate, acceleration, attitude and encoders; in the full run with noise of "
+            f"{', '.join(f'{noise:g}' for noise in NOISES)} (rad/s, m/s2, rad).",
             known="All links except the base.",
-            unknown="The base, with a guess that is wrong by some 10 %.",
+            unknown="The base, with a guess that is wrong by about 10 %.",
             replicates="Different motions, starts and noise; causes in and outside the catalogue at five strengths; "
             "each correct study with up to ten times the noise, mountings of up to 30 degrees, guesses of the base "
             "wrong by a factor of up to three, and only some of its sensors.",

@@ -1,4 +1,4 @@
-"""Which manoeuvre determines the base best: the paper's criterion against the posterior it leads to.
+"""Which manoeuvre determines the base best: the paper's criterion compared with posterior criteria.
 
 The paper's manoeuvre of section 4.1, a poor neighbour of it and the best by each criterion compete on ETS-VII at equal
 duration within the rule of the flight (50 mm/s and 5 deg/s at the tip). The predicted posterior is compared with the
