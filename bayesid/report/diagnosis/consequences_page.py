@@ -49,8 +49,8 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
         document.figure(
             figures.parameter_forest(changes),
             "Inertial parameters relative to their values without the named causes; bars contain 95 %. The axis is "
-            "limited to the fits: a prior that reaches beyond it is drawn as a line over the whole width. A shift beyond "
-            "the bars is an error that would otherwise have gone unnoticed.",
+            "limited to the fits: a prior that reaches beyond it is drawn as a line over the whole width. A shift "
+            "beyond the bars is an error that would otherwise have gone unnoticed.",
         )
     _add_disturbance(document, result)
 
