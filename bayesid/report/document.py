@@ -52,7 +52,7 @@ FONTS = [str(Path(mpl.get_data_path()) / "fonts" / "ttf")]
 """Folder of the letters of figures, whose text remains text in the PDF."""
 
 QUANTITY = re.compile(
-    r"(?:(?:\b[xyz]|\w+\.\w+) )?(?:[<>] )?\(?[−+]?\d[\d.]*(?: ± [\d.]+\)?)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+    r"(?:(?:\b[xyz]|\w+\.\w+) )?(?:[<>] )?\(?[−+]?\d+(?:\.\d+)?(?: ± [\d.]+\)?)?(?: × 10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
     r"(?: (?:%|(?:N|A|kg|mm|m|s|rad|Hz)[²³]?(?:/\w+[²³]?)?)(?![\w.]\w))*"
 )
 """A number with its axis, its uncertainty, its power of ten and its unit, in which no line is broken."""
