@@ -428,7 +428,7 @@ def _cloud_figure(result: Result) -> Figure:
 @styled
 def _realised_figure(realised: Mapping[str, Realised]) -> Figure:
     """Draw the ten ratios of every manoeuvre on its line, and their geometric mean."""
-    figure = wide_figure(0.55 + 0.19 * len(realised))
+    figure = wide_figure(max(1.5, 0.55 + 0.19 * len(realised)))
     axes = figure.subplots()
     axes.axvspan(1.0 - WITHIN, 1.0 + WITHIN, **BAND)
     for row, each in enumerate(realised.values()):
