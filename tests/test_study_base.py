@@ -12,8 +12,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.document import _least_filled, fitted_height
+from bayesid.report.document import _least_filled
 from bayesid.report.figures.figure_style import styled, wide_figure
+from bayesid.report.vector_figure import VectorFigure
 from studies.common.provenance import study_origin
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
 from tests.pdf_text import PdfText, links_of
@@ -164,10 +165,8 @@ def test_a_figure_is_not_made_lower_than_its_named_ticks_permit(tmp_path: Path):
 
     letters = 72.0 * 2.0 / 8.0  # of 8 points, which a figure of two inches would hold without axes and room
     for count, lowest in ((2, 0.7), (10, 0.9), (int(letters), 1.0)):
-        document = Document("Good")
-        document.figure(named(count), "Named ticks.")
-        (drawn,) = document._figures
-        height = fitted_height(drawn, 0.7) / 2.0
+        drawn = named(count)
+        height = VectorFigure(drawn).height(0.7) / 2.0
         assert height == pytest.approx(0.7) if lowest == 0.7 else 0.7 < height <= lowest
         axes = drawn.axes[0].get_position().height * 2.0 * 72.0 - 144.0 * (1.0 - height)
         assert axes >= 1.15 * 8.0 * count - 1e-9 or height == 1.0

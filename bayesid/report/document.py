@@ -5,9 +5,7 @@ Text that callers give is never read as markup: it reaches Typst as string liter
 
 from __future__ import annotations
 
-import io
 import json
-import math
 import re
 import tempfile
 from collections.abc import Sequence
@@ -16,33 +14,29 @@ from pathlib import Path
 
 import matplotlib as mpl
 import typst
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
-from bayesid.report.figures.figure_style import with_plain_labels
+from bayesid._math.threads import in_threads
+from bayesid.report.vector_figure import VectorFigure
 
 __all__ = ["Document", "LinkedText", "Rows"]
 
 Rows = list[list[str]]
 """Cells of a table, row by row."""
 
-MANY_POINTS = 4000  # number of points above which a line or a scatter plot is drawn as pixels inside the vector figure
-RESOLUTION = 250  # resolution of what is drawn as pixels [dots per inch]
 LONG_WORD = 14  # number of characters from which on a word in a table may break at its punctuation
 
 WHOLE = 12
 """Number of lines of a table above which it may break between two pages; the caption stays with the first of them."""
 
-ROOM = 1.15  # least distance of named ticks along a vertical axis, in heights of their letters
 LINE = 60  # number of characters of a table's cell that fill about one line
 
 HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3)
 """Factors on the heights of figures and on the space in tables, tried in this order until every page is filled."""
+
+TOGETHER = 2  # number of these factors that are tried side by side
 
 FILLED = 0.7  # fraction of its text's height to which every page is then filled, where one of the factors permits
 
@@ -95,8 +89,7 @@ class Document:
             f"#title({literal(title)}, {literal(subtitle)}, {literal(date or '')})\n",
         ]
         self._links: list[str] = []
-        self._figures: list[Figure] = []
-        self._drawn: list[bytes] = []
+        self._figures: list[VectorFigure] = []
 
     def section(self, title: str) -> None:
         """Begin a numbered section."""
@@ -194,8 +187,7 @@ class Document:
 
     def _image(self, fig: Figure) -> str:
         """Keep a figure for the document and return the literal of its file's name."""
-        self._figures.append(fig)
-        self._drawn.append(_svg(fig))
+        self._figures.append(VectorFigure(fig))
         return literal(f"figure-{len(self._figures)}.svg")
 
     def write(self, path: str | Path, *, filled: bool = False) -> None:
@@ -207,33 +199,35 @@ class Document:
         filled : bool
             Whether all figures and tables may be made lower or higher by one of `HEIGHTS`, if that fills the pages.
         """
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            source = folder / "main.typ"
-            look, *content = self._parts
-            marked = [part + _MARK if _sets(part) else part for part in content]
-            source.write_text("".join([look, *self._links, *marked]), encoding="utf-8")
-            factor = self._filling_height(source) if filled else 1.0
-            drawn = self._drawn if factor == 1.0 else [_svg(fig, factor) for fig in self._figures]
-            _write_all(folder, drawn)
+        look, *content = self._parts
+        marked = [part + _MARK if _sets(part) else part for part in content]
+        source = "".join([look, *self._links, *marked])
+        factor = self._filling_height(source) if filled else 1.0
+        with tempfile.TemporaryDirectory() as folder:
+            main = _write_all(Path(folder), source, [figure.svg(factor) for figure in self._figures])
             inputs = {"height": str(factor)}
-            pdf = typst.compile(str(source), root=name, format="pdf", sys_inputs=inputs, font_paths=FONTS)
+            pdf = typst.compile(main, root=folder, format="pdf", sys_inputs=inputs, font_paths=FONTS)
         with complete_file(path) as part:
             part.write_bytes(pdf)
 
-    def _filling_height(self, source: Path) -> float:
+    def _filling_height(self, source: str) -> float:
         """Return the first factor with which all pages are filled to `FILLED`, or the one that comes nearest to it."""
         flows = [_flows(part) for part in self._parts[1:] if _sets(part)]
+
+        def least_filled(factor: float) -> float:
+            with tempfile.TemporaryDirectory() as folder:
+                main = _write_all(Path(folder), source, [figure.blank(factor) for figure in self._figures])
+                inputs = {"height": str(factor)}
+                ends = typst.query(main, "<end>", field="value", root=folder, sys_inputs=inputs, font_paths=FONTS)
+            return _least_filled(json.loads(ends), flows)
+
         fills: dict[float, float] = {}
-        for factor in HEIGHTS:
-            _write_all(source.parent, [_blank(fig, factor) for fig in self._figures])
-            inputs = {"height": str(factor)}
-            ends = json.loads(
-                typst.query(str(source), "<end>", field="value", root=str(source.parent), sys_inputs=inputs)
-            )
-            fills[factor] = _least_filled(ends, flows)
-            if fills[factor] >= FILLED:
-                return factor
+        for first in range(0, len(HEIGHTS), TOGETHER):
+            some = HEIGHTS[first : first + TOGETHER]
+            fills |= zip(some, in_threads(least_filled, some), strict=True)
+            for factor in some:
+                if fills[factor] >= FILLED:
+                    return factor
         return max(fills, key=lambda factor: fills[factor])
 
 
@@ -295,66 +289,9 @@ def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Se
         raise InputError(f"unknown alignment {', '.join(sorted(unknown))}", remedy="Choose left, center or right")
 
 
-def _write_all(folder: Path, figures: Sequence[bytes]) -> None:
+def _write_all(folder: Path, source: str, figures: Sequence[bytes]) -> str:
+    """Write the source of a document and its figures into a folder, and return the source's path."""
     for number, content in enumerate(figures, start=1):
         (folder / f"figure-{number}.svg").write_bytes(content)
-
-
-def fitted_height(figure: Figure, factor: float) -> float:
-    """Return a figure's height multiplied by a factor, or as much of its height as its named ticks need [inch].
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure that is laid out already.
-    factor : float
-    """
-    height = float(figure.get_size_inches()[1])
-    lowest = 0.0
-    for axes in figure.axes:
-        named = [label for label in axes.get_yticklabels() if label.get_text()]
-        needed = ROOM * sum(float(label.get_fontsize()) for label in named) / 72.0
-        lowest = max(lowest, height + needed - axes.get_position().height * height if named else 0.0)
-    return max(factor * height, min(lowest, height))
-
-
-def _blank(fig: Figure, factor: float) -> bytes:
-    """Return an empty SVG of the size that `_svg` gives a figure."""
-    width, height = 72.0 * fig.get_size_inches()[0], 72.0 * fitted_height(fig, factor)
-    size = f'width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}/>'.encode()
-
-
-def _svg(fig: Figure, factor: float = 1.0) -> bytes:
-    """Return a figure, its height multiplied by a factor (`fitted_height`), as SVG, many points as a picture."""
-    for axes in fig.axes:
-        for artist in axes.get_children():
-            if _points(artist) > MANY_POINTS:
-                artist.set_rasterized(True)
-    with_plain_labels(fig)
-    width, height = fig.get_size_inches()
-    fig.set_size_inches(width, fitted_height(fig, factor))
-    engine = fig.get_layout_engine()
-    if engine is not None:  # drawing would lay the figure out once more
-        engine.execute(fig)
-        fig.set_layout_engine("none")
-    fig.set_dpi(RESOLUTION)
-    content = io.BytesIO()
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "bayesid"}):
-        # savefig would draw the figure twice, the first time to find its layout
-        FigureCanvasSVG(fig).print_svg(content, metadata={"Date": None})
-    fig.set_size_inches(width, height)
-    fig.set_layout_engine(engine)
-    return content.getvalue()
-
-
-def _points(artist: Artist) -> float:
-    """Return the number of points of a line, of a scatter plot, or of a mesh, which counts as many; otherwise 0."""
-    match artist:
-        case Line2D():
-            return len(artist.get_xdata())  # type: ignore[arg-type]
-        case PathCollection():
-            return len(artist.get_offsets())  # type: ignore[arg-type]
-        case QuadMesh():
-            return math.inf
-    return 0
+    (folder / "main.typ").write_text(source, encoding="utf-8")
+    return str(folder / "main.typ")
