@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from bayesid.report import Document
 from bayesid.report.document import LinkedText
 from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, styled, wide_figure
+from studies.common.code_version import UNRECORDED
 from studies.common.study import NOT_FULL, Goal, Verdict
 
 
@@ -116,6 +117,7 @@ def write_validation(folder: Path, output: Path) -> None:
             ("Where", _where(goals)),
             *_caution(summaries),
             *_without(folder, summaries),
+            ("Versions", _versions(summaries)),
             ("See also", "manual.pdf: the manual. README.md: goals by study. Study names link to their reports."),
         ],
     )
@@ -175,6 +177,17 @@ def verdict_figure(goals: Sequence[Judged]) -> Figure:
     axes.set_yticks(place, studies)
     shared_legend(figure, axes, len(ORDER))
     return figure
+
+
+def _versions(summaries: Mapping[str, dict[str, Any]]) -> str:
+    """Return which studies' figures are of which release, as far as they state it."""
+    studies: dict[str, list[str]] = {}
+    for name, summary in summaries.items():
+        for release in sorted({version["release"] for version in summary.get("versions", [])} or {UNRECORDED.release}):
+            studies.setdefault(release, []).append(name)
+    if len(studies) == 1:
+        return f"All figures are of bayesid {next(iter(studies))}."
+    return "Figures are of bayesid " + "; ".join(f"{key} ({', '.join(names)})" for key, names in studies.items()) + "."
 
 
 def _summaries(folder: Path) -> dict[str, dict[str, Any]]:

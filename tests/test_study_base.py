@@ -15,6 +15,7 @@ from bayesid.report import Document
 from bayesid.report.document import _least_filled
 from bayesid.report.figures.figure_style import styled, wide_figure
 from bayesid.report.vector_figure import VectorFigure
+from studies.common.code_version import CodeVersion
 from studies.common.provenance import study_origin
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
 from tests.pdf_text import PdfText, links_of
@@ -113,6 +114,15 @@ def test_what_is_badly_written_is_seen(text: str, rule: str):
 def test_what_is_well_written_is_left_alone():
     words = "8 × 10⁵, −0.3, 2026-11-23, link2-3, rate-noise, --seed 1, 6-8 m/s², x2, commit 12e45678ab90, 1–2 kg m²"
     assert list(badly_written(words)) == []
+
+
+def test_figures_of_other_code_are_stated_on_the_first_page(tmp_path: Path):
+    STUDY.write(3.1, tmp_path / "now.pdf")
+    assert "the code that makes them" not in PdfText.read(tmp_path / "now.pdf")
+    other = CodeVersion("0.1.0", "0123456789ab", "an older one")
+    STUDY.write(3.1, tmp_path / "older.pdf", versions=[other])
+    assert "0.1.0 (commit 0123456789ab)" in PdfText.read(tmp_path / "older.pdf").pages[0]
+    assert json.loads((tmp_path / "older.json").read_text())["versions"] == [other._asdict()]
 
 
 def test_a_hyphen_an_empty_half_page_and_a_lonely_caption_are_seen_in_a_report(tmp_path: Path):

@@ -33,6 +33,7 @@ from studies.blind_injections.rows import (
     statements,
 )
 from studies.blind_injections.trials import Plan, read
+from studies.common.code_version import CodeVersion
 from studies.common.monte_carlo import read_store
 from studies.common.study import Verdict
 from studies.truth import hidden_causes
@@ -298,7 +299,8 @@ def test_the_report_is_written(trials, tmp_path):
 
 @pytest.mark.slow
 def test_the_report_is_that_of_the_committed_trials(committed, tmp_path):
-    STUDY.write(Campaign(committed, len(plan(full=True))), tmp_path / "blind.pdf")
+    made_by = CodeVersion.of_trials(REPORTS / "blind_injections.jsonl.gz")
+    STUDY.write(Campaign(committed, len(plan(full=True))), tmp_path / "blind.pdf", versions=made_by)
     assert broken_rules(tmp_path / "blind.pdf") == []
     made, kept = (json.loads(file.read_text()) for file in (tmp_path / "blind.json", REPORTS / "blind_injections.json"))
     assert {**made, "origin": kept["origin"]} == kept

@@ -1,6 +1,7 @@
 """Monte Carlo trials that can be interrupted, run in parallel, and repeat exactly from their seed.
 
-A store is a text file with one JSON object per line: first what function ran with what seed, then one line per trial.
+A store is a text file with one JSON object per line: first what function ran with what seed, then one line per trial
+with the version of the code that made it.
 A line is appended in one write when its trial ends, so that a kill loses the trials that were running and no other.
 """
 
@@ -19,6 +20,8 @@ from threading import Thread
 from typing import Any
 
 import numpy as np
+
+from studies.common.code_version import CodeVersion, study_of
 
 Workers = int | Executor  # number of processes of this machine, one for this process itself; or an executor of any kind
 
@@ -86,11 +89,12 @@ def run_trials(
     header = {"function": f"{function.__module__}.{function.__qualname__}", "seed": seed}
     stored = {} if file is None else _resume(file, header, tasks)
     outcomes = Outcomes([stored.get(number) for number in range(len(tasks))])
+    code = CodeVersion.present(study_of(function.__module__))
     began, done = time.monotonic(), len(stored)
     try:
         left = [number for number in range(len(tasks)) if number not in stored]
         for count, (number, outcome) in enumerate(_outcomes(function, tasks, left, seed, workers), start=1):
-            text = json.dumps({"trial": number, "task": tasks[number], **outcome}, default=_plain)
+            text = json.dumps({"trial": number, "task": tasks[number], **outcome, "code": code}, default=_plain)
             if file is not None:
                 _append(file, text)
             # a result that has just been computed must not differ from one that a store held

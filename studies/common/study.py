@@ -23,6 +23,7 @@ from bayesid._io.files import complete_file, write_json
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.app.options import executor_at
 from bayesid.report import Document
+from studies.common.code_version import CodeVersion, caution
 from studies.common.provenance import MODELS, study_origin
 from studies.common.report_parts import glossary, link_reports
 
@@ -162,11 +163,19 @@ class Report(Generic[R]):
     beside: str = "Tables with this report: {all}."
     credit: str = ""  # sentence added to where the report comes from
 
-    def document(self, result: R, output: Path) -> Document:
-        """Return the printed report without its foot; the tables are written beside the output."""
+    def document(self, result: R, output: Path, stale: str = "") -> Document:
+        """Return the printed report without its foot; the tables are written beside the output.
+
+        Parameters
+        ----------
+        result : object; what the study's `run` returned
+        output : Path; file of the PDF
+        stale : str, optional; what is said where another version of the code made the figures
+        """
         document = Document(self.title, self.subtitle)
         entries = [("Question", self.question), ("Valid when", self.valid)]
-        document.decision(self.answer, entries if self.full else [*entries, ("Caution", NOT_FULL)])
+        cautions = [("Caution", text) for text in ("" if self.full else NOT_FULL, stale) if text]
+        document.decision(self.answer, [*entries, *cautions])
         if self.figure is not None:
             document.figure(*self.figure)
         rows = [[goal.text, goal.reached, goal.verdict.value] for goal in self.goals]
@@ -193,11 +202,11 @@ class Report(Generic[R]):
             document.paragraph(self.beside.format(*files, all=", ".join(files)))
         return document
 
-    def summary(self, origin: str | None) -> dict[str, Any]:
+    def summary(self, origin: str | None, versions: Sequence[CodeVersion]) -> dict[str, Any]:
         """Return what the JSON file beside the report holds."""
         goals = [asdict(goal) for goal in self.goals]
         said = {"question": self.question, "answer": self.answer, "goals": goals, "valid": self.valid}
-        return {**said, "full": self.full, "origin": origin}
+        return {**said, "full": self.full, "origin": origin, "versions": [version._asdict() for version in versions]}
 
 
 @dataclass(frozen=True)
@@ -252,10 +261,12 @@ class Study(Command, Generic[R]):
         keep_compiled()
         chosen = {name: value for name, value in vars(options).items() if name != "output"}
         result = self.run(**chosen, progress=show)
-        self.write(result, options.output, study_origin(self.name, options, self.inputs(options)))
+        store = getattr(options, "trials", None)
+        versions = CodeVersion.of_trials(store) if store is not None and store.is_file() else []
+        self.write(result, options.output, study_origin(self.name, options, self.inputs(options)), versions)
         show(f"Wrote {options.output}.")
 
-    def write(self, result: R, output: Path, origin: str | None = None) -> None:
+    def write(self, result: R, output: Path, origin: str | None = None, versions: Sequence[CodeVersion] = ()) -> None:
         """Write the report as PDF, and beside it its summary as JSON and its tables as CSV.
 
         The meanings of the terms that it uses stand at the foot of its last page, which is filled to one half where the
@@ -266,14 +277,16 @@ class Study(Command, Generic[R]):
         result : object; what `run` returned
         output : Path; file of the PDF; the other files have its name but for their endings
         origin : str, optional; where the report comes from, `studies.common.provenance.study_origin`
+        versions : sequence of CodeVersion, optional; of the code that made the figures, by default the present one
         """
-        report = self.report(result)
-        document = report.document(result, output)
+        report, present = self.report(result), CodeVersion.present(self.name)
+        versions = versions or [present]
+        document = report.document(result, output, caution(versions, present))
         if origin is not None and report.credit:
             origin = f"{origin.rstrip('.')}. {report.credit}"
         document.foot(origin or "", glossary(document))
         document.write(output, filled=True)
-        write_json(output.with_suffix(".json"), report.summary(origin))
+        write_json(output.with_suffix(".json"), report.summary(origin, versions))
 
 
 def show(*said: float | str) -> None:
