@@ -6,7 +6,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import product
+from itertools import cycle, islice, product
 from pathlib import Path
 from typing import Any
 
@@ -36,26 +36,29 @@ EXPLAINING = ("explained", "partly-explained")  # statuses in which causes are n
 MATTERS = 0.01  # probability above which a cause is kept with its trial
 WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)  # least and largest strength of causes of the catalogue and of others
 
-# seed of the first trial of the small and of the full plan; those of tests and of development are others
-FIRST_SEED = {False: 200, True: 90_000}
+# seed of the first trial of the small and of the full plan; those of tests, of development and of earlier campaigns are
+# others
+FIRST_SEED = {False: 200, True: 300_000}
 
-# cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
-# others with a cause of the catalogue there are for each that they replace
-LATER, FROM, EVERY = ("mass-shift",), 700, 26
+# numbers of trials of the full plan with a cause of the catalogue, with one outside it and with nothing hidden, and how
+# many of these fly in Basilisk
+COUNTS = {"effect": 1000, "unknown": 400, "adequate": 1000}
+IN_BASILISK = {"effect": 75, "unknown": 0, "adequate": 75}
 
-# from which trial of the full plan on, and how often, Basilisk makes the data of a case with or without a cause
-IN_BASILISK, EVERY_EIGHTH = 937, 8
+AnyCase = hidden_causes.Case | hidden_causes.WheelCase | BasiliskCase
 
-_ALL: tuple[hidden_causes.Case | BasiliskCase, ...] = (*hidden_causes.CASES, *BASILISK_CASES)
+_MUJOCO = tuple(case for case in hidden_causes.CASES if case.name not in hidden_causes.NOW_LISTED)
+_CURRENT: tuple[AnyCase, ...] = (*_MUJOCO, *hidden_causes.FURTHER_CASES, *BASILISK_CASES)
+_EARLIER = tuple(case for case in hidden_causes.CASES if case.name in hidden_causes.NOW_LISTED)
 
-CASES = {case.name: case for case in _ALL}  # all cases by name
+CASES: dict[str, AnyCase] = {case.name: case for case in (*_CURRENT, *_EARLIER)}  # all cases by name
 _NOT_SEEN = Limits(None, None, None)  # limits where what is hidden does not change the mean of the data
 SPOILT = ("outliers", "quantisation")  # beginnings of the names of causes that do not change the mean of the data
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One trial to be made: name of a case of `studies.truth.hidden_causes`, seed, and strength of what is hidden."""
+    """One trial to be made: name of a case, seed, and strength of what is hidden."""
 
     case: str
     seed: int
@@ -102,6 +105,9 @@ class Trial:
     true_frame: str | None
     correlation: float | None  # correlation of the reconstructed outside torque with the true one
     seconds: dict[str, float]  # time of the diagnosis by phase, and "total" with the files read [s]
+    # whether anything remains beside the named causes, as the verdict says ("none", "undecided", "present"); None in
+    # trials of the second release, which did not say
+    remainder: str | None = None
 
     @property
     def alarmed(self) -> bool:
@@ -139,44 +145,26 @@ def plan(full: bool) -> list[Plan]:
     """Return the plans of all trials, each with a seed of its own, in random order.
 
     A run that was stopped has thus made a random sample of its plan. The small plan has one trial of every case; the
-    full one has 1,000 with something hidden, every fifth of them outside the catalogue, and 1,000 with nothing. The
-    strengths are log-uniform between ends that give signal-to-noise ratios of about 3 to 80. Cases that came later,
-    those that Basilisk flies among them, replace some of the full plan's last trials, so that those made before keep
-    their places.
+    full one has `COUNTS` trials, in which the cases of each kind take turns. The strengths are log-uniform between ends
+    that give signal-to-noise ratios of about 3 to 80.
     """
-    draw = np.random.default_rng(2)
-    effects, outside, quiet = (_names(status) for status in ("effect", "unknown", "adequate"))
-    if full:
-        later = {*LATER, *(case.name for case in BASILISK_CASES)}
-        effects, quiet = ([name for name in names if name not in later] for names in (effects, quiet))
-    counts = (800, 200, 1000) if full else (len(effects), len(outside), len(quiet))
-    cases = [
-        (names[index % len(names)], ends)
-        for names, count, ends in zip((effects, outside, quiet), counts, (WEAK_TO_STRONG, OUTSIDE, None), strict=True)
-        for index in range(count)
-    ]
-    first = FIRST_SEED[full]
-    plans = [
-        Plan(name, first + number, 1.0 if ends is None else float(f"{np.exp(draw.uniform(*np.log(ends))):.3g}"))
-        for number, (name, ends) in enumerate(cases)
-    ]
-    shuffled = [plans[number] for number in draw.permutation(len(plans))]
-    places = [place for place in range(FROM, len(shuffled)) if shuffled[place].case in effects]
-    for number, place in enumerate(places[::EVERY]):
-        shuffled[place] = replace(shuffled[place], case=LATER[number % len(LATER)])
-    if full:
-        for status in ("effect", "adequate"):
-            flown = [case.name for case in BASILISK_CASES if case.status == status]
-            like = [
-                place for place in range(IN_BASILISK, len(shuffled)) if CASES[shuffled[place].case].status == status
-            ]
-            for number, place in enumerate(like[::EVERY_EIGHTH]):
-                shuffled[place] = replace(shuffled[place], case=flown[number % len(flown)])
-    return shuffled
+    draw = np.random.default_rng(3)
+    plans: list[Plan] = []
+    for kind, ends in (("effect", WEAK_TO_STRONG), ("unknown", OUTSIDE), ("adequate", None)):
+        for name in _cases_of(kind, full):
+            strength = 1.0 if ends is None else float(f"{np.exp(draw.uniform(*np.log(ends))):.3g}")
+            plans.append(Plan(name, FIRST_SEED[full] + len(plans), strength))
+    return [plans[number] for number in draw.permutation(len(plans))]
 
 
-def _names(status: str) -> list[str]:
-    return [case.name for case in CASES.values() if case.status == status]
+def _cases_of(kind: str, full: bool) -> list[str]:
+    """Return the names of the cases of the trials of a kind."""
+    flown = [case.name for case in BASILISK_CASES if case.status == kind]
+    others = [case.name for case in _CURRENT if case.status == kind and case.name not in flown]
+    if not full:
+        return [*others, *flown]
+    counts = (COUNTS[kind] - IN_BASILISK[kind], IN_BASILISK[kind])
+    return [name for names, count in zip((others, flown), counts, strict=True) for name in islice(cycle(names), count)]
 
 
 def run(
@@ -263,11 +251,12 @@ def make(plan: Plan) -> Trial:
         true_frame=None if wrench is None else wrench.frame,
         correlation=None if wrench is None else _correlation(result, wrench, plan, written),
         seconds={**result.seconds, "total": total},
+        remainder=result.remainder.verdict.value,
         **vars(size),
     )
 
 
-def _visible(case: hidden_causes.Case | BasiliskCase) -> bool:
+def _visible(case: AnyCase) -> bool:
     """Return whether what is hidden changes the mean of the data."""
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
@@ -283,7 +272,7 @@ def _signal(result: Diagnosis, weaker: Study) -> Floats:
     return (perturbed.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
 
 
-def _limits(result: Diagnosis, case: hidden_causes.Case | BasiliskCase, seed: int, change: Floats) -> Limits:
+def _limits(result: Diagnosis, case: AnyCase, seed: int, change: Floats) -> Limits:
     if case.status == "unknown":
         return replace(_NOT_SEEN, signal_to_noise=what_is_left(result, change))
     names = set(case.causes) | set(case.accept)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from studies.truth.numerics import Array
@@ -36,6 +37,12 @@ class Truth(NamedTuple):
         """Rows at some of the times."""
         rows = np.searchsorted(self.times, times)
         return Truth(*(values[rows] for values in self))
+
+    def between(self, times: Array) -> Truth:
+        """Rows at any times within, by cubic splines, for motions that are smooth from one time to the next."""
+        attitude = CubicSpline(self.times, self.attitude)(times)
+        found = Truth(*(CubicSpline(self.times, values)(times) for values in self))
+        return found._replace(times=times, attitude=attitude / np.linalg.norm(attitude, axis=1, keepdims=True))
 
 
 Table = dict[str, Array]  # columns of a recording by channel; NaN where a sensor takes no sample

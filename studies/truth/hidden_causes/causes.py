@@ -350,13 +350,13 @@ def _moved(mover: mj.Mover) -> Options:
     return _hide(movers=[mover]) | {"true": {"mass-shift": mover.moments}}
 
 
-def bias_jump(draw: Generator, strength: float) -> Options:
-    """Bias of the rate sensor that jumps once."""
-    jump, instant = direction(draw, 4e-5 * strength), float(draw.uniform(40.0, 100.0))
+def bias_jump(draw: Generator, strength: float, sensor: str = "rate", size: float = 4e-5) -> Options:
+    """Bias of the rate sensor, or of the accelerometer, that jumps once."""
+    jump, instant = direction(draw, size * strength), float(draw.uniform(40.0, 100.0))
 
     def distort(table: Table, truth: Truth) -> None:
-        for axis, size in zip("xyz", jump, strict=True):
-            table[f"rate.{axis}"] += np.where(truth.times >= instant, size, 0.0)
+        for axis, change in zip("xyz", jump, strict=True):
+            table[f"{sensor}.{axis}"] += np.where(truth.times >= instant, change, 0.0)
 
     return {"distort": distort}
 

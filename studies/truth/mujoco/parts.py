@@ -208,13 +208,14 @@ def braking(coefficients: ArrayLike) -> Field:
     return lambda time, attitude, rate: (np.zeros(3), -factor * rate)
 
 
-def pulses(torque: ArrayLike, *, every: float, length: float, start: float = 0.0) -> Field:
-    """Torque pulses, base axes; their edges must be sample times."""
-    vector = np.asarray(torque, dtype=float)
+def pulses(
+    torque: ArrayLike, *, every: float, length: float, start: float = 0.0, force: ArrayLike = (0.0, 0.0, 0.0)
+) -> Field:
+    """Pulses of torque, and of force at the base origin, base axes; their edges must be ends of integration steps."""
+    on, off = (np.asarray(force, dtype=float), np.asarray(torque, dtype=float)), (np.zeros(3), np.zeros(3))
 
     def pulse(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
-        on = time >= start and (time - start) % every < length
-        return np.zeros(3), vector if on else np.zeros(3)
+        return on if time >= start and (time - start) % every < length else off
 
     return pulse
 

@@ -70,6 +70,7 @@ def write_study(
     initial_rate: str | None = None,
     latitudes: Sequence[float] | None = None,
     step: float = 0.05,
+    flown: float | None = None,
     title: str = "MuJoCo truth",
 ) -> Study:
     """Write robot.urdf, manoeuvre-N.csv and study.toml into a folder.
@@ -101,6 +102,9 @@ def write_study(
     initial_rate : str, optional; what the study says of the initial rate
     latitudes : sequence of float, optional; argument of latitude of each recording [rad] in place of the orbit's
     step : float; largest integration step [s]
+    flown : float, optional
+        Period at which a smooth motion is flown and between which it is interpolated [s]; by default every sample is
+        flown.
     title : str
 
     Returns
@@ -137,9 +141,13 @@ def write_study(
         options["movers"] = [mover.in_recording(index - 1) for mover in hidden.movers]
         model = TruthModel(urdf, orbit=place, fields=fields, changed=changed, configuration=configuration, **options)
         instants = np.unique(np.concatenate(list(taken.values())))
-        whole = model.run(motion, instants, rate0=rate, attitude0=attitudes[-1], step=step)
-        truth = whole.at(times)
-        table = rec.columns(model.joints, {name: whole.at(when) for name, when in taken.items()}, samples, times)
+        if flown is None:
+            at = model.run(motion, instants, rate0=rate, attitude0=attitudes[-1], step=step).at
+        else:
+            few = np.arange(np.floor(instants[0] / flown), np.ceil(instants[-1] / flown) + 1.0) * flown
+            at = model.run(motion, few, rate0=rate, attitude0=attitudes[-1], step=step).between
+        truth = at(times)
+        table = rec.columns(model.joints, {name: at(when) for name, when in taken.items()}, samples, times)
         if distort is not None:
             distort(table, truth)
         rec.add_noise(table, sensors, generator)
