@@ -45,9 +45,11 @@ from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report.diagnosis import diagnosis_sentences as sentences
 from bayesid.report.diagnosis.appendix import (
+    CHOICES,
     GLOSSARY,
     bound_rows,
     candidate_rows,
+    choice_text,
     robustness_sentence,
     sensitivity_rows,
 )
@@ -640,12 +642,15 @@ def test_the_sensitivity_says_under_which_choices_the_verdict_is_another(biased)
     other = ProbableVerdict(Status.AMBIGUOUS, ("accel-bias",), {}, ((),))
     changed = replace(biased.sensitivity, others={**biased.sensitivity.others, first: other})
     result = replace(biased, sensitivity=changed)
-    assert sensitivity_rows(result) == [[first, "ambiguous: accel-bias or nothing"]]
+    assert sensitivity_rows(result) == [[choice_text(first), "ambiguous: accel-bias or nothing"]]
     said, others = robustness_sentence(result), list(biased.sensitivity.others)
     assert said.startswith(
         f"The verdict would change under 1 of {len(others)} other choices. It remains the same with "
     )
-    assert [name for name in others if name in said] == others[1:]
+    assert [name for name in others if choice_text(name) in said] == others[1:]
+    assert robustness_sentence(biased).startswith(f"The verdict is the same under {len(others)} other choices: ")
+    assert all(choice_text(name) in robustness_sentence(biased) for name in others)
+    assert set(CHOICES) == set(others)  # no name of a key reaches the reader
     assert sensitivity_rows(biased) == []
 
 
@@ -665,7 +670,7 @@ def test_the_method_states_false_alarms_the_prior_and_the_seed(biased):
     assert "Seed of all random numbers: 3." in said
     listed = {row.name for row in biased.candidates}
     assert all((name in said) is (name not in listed) for name in biased.probabilities.causes)
-    assert f"{sum(biased.seconds.values()):.1f} s until the verdict" in computation_sentence(biased)
+    assert f"{sum(biased.seconds.values()):.1f} s in total" in computation_sentence(biased)
 
 
 def test_the_conditions_name_uncertain_links(biased):
@@ -913,7 +918,7 @@ def test_what_changes_the_readings_alone_has_no_disturbance(printed):
 def test_an_unknown_cause_is_shown_as_a_torque_with_its_correlations(printed):
     result, text = printed(Status.UNKNOWN)
     assert sentences.wrench_sentence(result.unexplained) in text
-    assert "signal-to-noise ratio of 12.0. Its direction is fixed in base axes: the source is on board." in text
+    assert "ratio of 12.0. The direction of the torque is fixed in base axes: the source is on board." in text
     for frame in ("base", "orbit (zenith, along-track, normal)", "inertial"):
         assert f"Reconstructed torque and force, {frame} axes." in text
     for row in correlation_rows(torque_correlations(result.unexplained, result.before)):

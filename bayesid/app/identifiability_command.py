@@ -23,7 +23,7 @@ def run(
     ] = 500.0,
     profiles: Annotated[int, typer.Option(min=0, help="Maximum number of parameters to profile.")] = 6,
 ) -> Iterator[str]:
-    """Determine which body parameters the recordings resolve, and which additions would help: identifiability.json."""
+    """Determine which parameters the recordings resolve, and what would help: identifiability.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -13,7 +13,7 @@ from bayesid._io.errors import InputError
 __all__ = ["Output", "Samples", "Scheduler", "Seed", "StudyFile", "executor_at"]
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study file.")]
-Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; it is created.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results, created if it does not exist.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 Samples = Annotated[float, typer.Option("--samples", min=1.0, help="Number of effective samples.")]
 

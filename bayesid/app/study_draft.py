@@ -125,7 +125,7 @@ def _robot(robot: Robot, urdf: Path, folder: Path, nearest_physical: bool) -> st
         _line("[robot]", f"base {robot.base}, {len(robot.joints)} moving joints, {robot.mass:.6g} kg"),
         f"urdf = {_path(urdf, folder)}",
         *(["nearest_physical = true"] if nearest_physical else []),
-        _unsure("link_spread = 0.0", "relative uncertainty of all links that are not unknown; 0 = known exactly"),
+        _unsure("link_spread = 0.0", "uncertainty of all other links in length, masses by twice that; 0 = exact"),
         "# joints, all recorded:" if robot.joints else "# no moving joints",
         *(f"#   {joint.name}: {joint.kind}, {_limits(joint)}" for joint in robot.joints),
     )

@@ -208,17 +208,19 @@ def _inverse(matrix: Array) -> Array:
 @register_criterion
 @dataclass(frozen=True)
 class Paper26(Criterion):
-    """The paper's (26) as printed, computed from the largest excursion of each state of the base.
+    """Criterion (26) of the paper as printed, a reference for the other criteria.
 
-    Its signed differences cancel most terms. For three states -y1^2 + y2^2 + 3 y3^2 remains, which rewards mostly the
-    third state, penalises the first, and does not measure balance. It also adds metres to radians.
+    It is computed from the largest excursions y1, y2, y3 of the base along each axis, for position and attitude.
+    Because the printed differences have signs, most terms cancel: -y1^2 + y2^2 + 3 y3^2 is maximised. This rewards
+    the third axis and penalises the first, instead of balancing the three. Metres and radians are added.
     """
 
     name = "paper-26"
     meaning = (
-        "The paper's (26) as printed, for the largest excursions y1, y2, y3 of the base's position and of its "
-        "attitude. The signed differences cancel most terms: for each triple, −y1² + y2² + 3 y3² is maximised, which "
-        "rewards the third state, penalises the first and does not measure balance. Metres are added to radians."
+        "Criterion (26) of the paper as printed, computed from the largest excursions y1, y2, y3 of the base along "
+        "each axis, for position and attitude. Because the printed differences have signs, most terms cancel: "
+        "−y1² + y2² + 3 y3² is maximised. This rewards the third axis and penalises the first, instead of balancing "
+        "the three. Metres and radians are added."
     )
     informed = False
     usual = True
@@ -239,15 +241,15 @@ class Paper26(Criterion):
 @register_criterion
 @dataclass(frozen=True)
 class Paper26Intended(Paper26):
-    """Apparent intention of (26): large differences between the states increase the cost, whatever their sign.
+    """Apparent intention of (26): unequal excursions along the three axes increase the cost, whatever the sign.
 
-    For three states, 3 smallest^2 + middle^2 - largest^2 remains.
+    With the excursions sorted by size, 3 smallest^2 + middle^2 - largest^2 is maximised.
     """
 
     name = "paper-26-intended"
     meaning = (
-        "The apparent intention of (26): the squares of the excursions minus the magnitudes of their differences, so "
-        "that uneven motion is penalised for either sign."
+        "The apparent intention of (26): the squares of the excursions minus the magnitudes of the differences between "
+        "these squares, so that unequal excursions increase the cost, whatever the sign."
     )
     usual = False
 

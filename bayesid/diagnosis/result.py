@@ -64,6 +64,7 @@ class Diagnosis(ShortForm):
     sensitivity : VerdictSensitivity
         The verdict, and what it would be under other choices.
     candidates : list of Candidate
+        Every candidate cause, added alone to the present model.
     gain : Gain
         Present model against the extended one.
     disturbance : DisturbingWrench

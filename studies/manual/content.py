@@ -121,7 +121,9 @@ def _sections() -> Iterator[dict[str, Any]]:
         keys: list[dict[str, Any]] = []
         for key, value in made["properties"].items():
             text = _pieces(value.get("description", ""))
-            row = {"value": _type(value), "default": _default(value.get("default")), "text": text}
+            default = value.get("default")
+            default = str(default).lower() if isinstance(default, bool) else _default(default)
+            row = {"value": _type(value), "default": default, "text": text}
             row["default"] = "required" if key in required else row["default"]
             if keys and {**row, "keys": keys[-1]["keys"]} == keys[-1]:
                 keys[-1]["keys"].append(key)
@@ -160,6 +162,8 @@ def _type(value: Mapping[str, Any]) -> str:
             return "path" if value.get("format") == "path" else "text"
         case "integer":
             return "whole number"
+        case "boolean":
+            return "true or false"
         case _:
             return "number" + {"exclusiveMinimum": " > 0", "minimum": " ≥ 0"}.get(_lower(value), "")
 

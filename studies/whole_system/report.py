@@ -56,21 +56,22 @@ def _report(result: Result) -> Report[Result]:
     return Report(
         title="The whole system identified",
         subtitle="Problem 3 of Lampariello and Hirzinger (IDETC 2005)",
-        question="ETS-VII carries a load of 120 kg and no body has exactly known inertial parameters: what does one "
-        "manoeuvre determine, with which sensors, and what must be known?",
-        answer=f"Joint torques determine the mass of the whole system to {torques}, and a known thrust to {thrust}. "
-        f"Motion alone determines mass ratios but not their scale, which comes from the drawings (whole system: "
-        f"{motion}). Data: one recording of {result.duration:g} s at 2 Hz, with rates of {format_number(RATE)} rad/s, "
-        f"accelerations of {format_number(ACCEL)} m/s² and torques of {format_number(TORQUE)} N m (noise per sample); "
-        f"the manoeuvre moves the tip {haste}.",
+        question="ETS-VII carries a load of 120 kg, and the inertial parameters of all bodies are uncertain. What does "
+        "one manoeuvre determine, with which sensors, and what must be known in advance?",
+        answer=f"With joint torques, the mass of the whole system has a standard deviation of {torques}, with a known "
+        f"thrust {thrust}. With motion alone it is {motion}: motion determines ratios of masses, and only the drawings "
+        f"give their scale. Data: one recording of {result.duration:g} s at 2 Hz, with noise per sample of "
+        f"{format_number(RATE)} rad/s, {format_number(ACCEL)} m/s² and {format_number(TORQUE)} N m (torques); the "
+        f"manoeuvre moves the tip {haste}.",
         valid=f"the tip moves {haste}, joints follow their path, the load is rigid and noise is white; widths are "
         "linearised about the truth unless marked as sampled.",
         goals=_goals(result),
         full=result.coverage is not None,
         figure=Picture(
             _mass_figure(result),
-            "Relative standard deviation of four masses after one manoeuvre with six joints: from the drawings, from "
-            "motion, with joint torques (friction unknown), and with a known thrust instead of torques.",
+            "Relative standard deviation of four masses: from the drawings alone, and after one manoeuvre with six "
+            "joints, from motion alone, with joint torques (friction unknown), and with a known thrust instead of "
+            "torques. Dashed: the goal.",
         ),
         setup=Setup(
             robot="ETS-VII with a rigid load of 120 kg on link 6, flown by an independent simulator (MuJoCo) with "
@@ -99,9 +100,10 @@ def _report(result: Result) -> Report[Result]:
             ),
             CsvTable("bodies", ["sensors", "body", "quantity", "truth", "drawings", "mean", "sd"], _body_rows(result)),
         ],
-        beside="Tables with this report: the gain from one exactly known body without drawings ({0}), and every "
-        "sampled parameter ({1}). The linear method differentiates rates with local cubics and weights every equation "
-        "by its residuals; the integral method is the mode of the posterior, whose fits start at the truth.",
+        beside="Tables with this report: standard deviations if there are no drawings and one part is known exactly "
+        "({0}), and every sampled parameter ({1}). The linear method differentiates the measured rates with local "
+        "cubic polynomials and weights each equation by its residuals. The integral method is the mode of the "
+        "posterior; its fits start at the truth.",
     )
 
 
@@ -129,7 +131,7 @@ def _goals(result: Result) -> list[Goal]:
         )
     texts = (
         f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} "
-        "over their number) and three methods agree",
+        "divided by their number) and mode, importance sampling and emcee agree",
         f"squared distances over drawn systems follow chi-square (Kolmogorov-Smirnov p at least {LEVEL:g})",
         f"distances beyond the {format_percent(TAIL)} quantile or below the {format_percent(1.0 - TAIL)} quantile: no "
         f"more than chance allows (two-sided p at least {LEVEL:g})",
@@ -167,11 +169,12 @@ def _negatives(document: Document, result: Result) -> None:
     texts = [
         "With motion alone, the paper's linear regressor method (19) estimates the mass of the whole system as "
         f"{format_percent(system, 2)} of its true value and states a standard deviation of "
-        f"{format_percent(float(linear.believed[:, 3].mean()), 2)}. Its right side is zero, so the data contain no "
-        "information about the scale. The noise of the entries acts as evidence for small masses, and more so in "
-        "longer recordings. Only the prior prevents smaller estimates.",
-        f"The bodies can differ in 80 directions. The data at least halve the width of {motion.contraction} (motion) "
-        f"or {torques.contraction} (with torques); the others remain closer to the prior.",
+        f"{format_percent(float(linear.believed[:, 3].mean()), 2)}. The right side of its equations is zero, so the "
+        "data contain no information about the scale, and noise in the regressor biases all masses towards zero, more "
+        "so in longer recordings. Only the prior prevents smaller estimates.",
+        f"The eight bodies have 80 parameters. In {motion.contraction} of 80 independent directions the data at least "
+        f"halve the prior width with motion alone, in {torques.contraction} with joint torques. The other directions "
+        "remain closer to the prior.",
     ]
     for case in result.cases:
         texts += list(case.result.disagreements)
@@ -199,7 +202,7 @@ def _distances(result: Result) -> str:
     return (
         f"Squared distance of the truth from the sampled posteriors: {seen}; expected: {unknowns} ± "
         f"{np.sqrt(2.0 * unknowns):.0f}. All cases share one truth and one set of drawings; in directions that the "
-        "data do not determine, the distance is that between these two."
+        "data do not determine, the distance only measures the difference between truth and drawings."
     )
 
 
@@ -213,8 +216,8 @@ def _evidence(document: Document, result: Result) -> None:
             for sensors in Sensors
             for knowledge in (information.knowledge(sensors),)
         ],
-        "Relative standard deviation of four masses after one manoeuvre, and number of directions (of 80) whose width "
-        "the data at least halve.",
+        "Relative standard deviation of four masses after one manoeuvre, and number of the 80 directions whose prior "
+        "width the data at least halve.",
         columns("llrrrrr"),
     )
     count = len(result.methods[0].errors)
@@ -226,9 +229,9 @@ def _evidence(document: Document, result: Result) -> None:
             for k, group in enumerate(GROUPS)
             if group in ("base", "whole system")
         ],
-        f"Linear regressors against the integral of the motion, relative errors over {count} recordings of one flight "
-        "with independent noise. The truth is fixed, so the mean error includes that of the drawings; the stated "
-        "standard deviation (sd) covers both.",
+        f"Linear regressor method and integral method: relative errors over {count} recordings of one flight with "
+        "independent noise. The true masses are the same in all recordings, so the mean error includes the error of "
+        "the drawings; the stated standard deviation (sd) includes it as well.",
         columns("llrrr"),
     )
     document.figure(
@@ -282,15 +285,17 @@ def _statements(result: Result) -> list[Statement]:
     vague = result.known["six joints"].knowledge(Sensors.TORQUES, widths=dict.fromkeys(bodies(result.truth), 1.0))
     return [
         Statement(
-            "The linear method needs joint torques and friction: with a right side of zero it is badly posed (3).",
+            "The linear method requires joint torques and a friction model: with a right side of zero it is badly "
+            "posed (3).",
             Finding.CONFIRMED if bias > FAR else Finding.REFUTED,
-            f"With motion alone its error is {format_number(bias, 2)} of its stated standard deviations.",
+            f"With motion alone its mean error is {format_number(bias, 2)} of its stated standard deviations.",
         ),
         Statement(
             "Identification of the whole system requires a known part (5).",
             Finding.CONFIRMED if gain > 2.0 else Finding.REFUTED,
-            f"With motion alone. Joint torques are {format_number(gain, 2)} times more precise and need no drawings: "
-            f"without any they determine the mass of the whole system to {format_percent(vague.mass(*system)[1], 2)}.",
+            "This applies to motion alone. With joint torques the mass of the whole system is "
+            f"{format_number(gain, 2)} times more precise, and without drawings its standard deviation is "
+            f"{format_percent(vague.mass(*system)[1], 2)}.",
         ),
         Statement(
             "The arm is known from CAD data, generally to 5 % (1).",

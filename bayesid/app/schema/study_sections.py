@@ -58,7 +58,7 @@ class RecordingSection(Section):
     Parameters
     ----------
     file : Path
-        CSV or Parquet file, see `bayesid.recording.recording`.
+        CSV or Parquet file in the format of a recording.
     attitude : (4,)
         Initial attitude, a quaternion from base to orbit axes.
     attitude_sigma : float, optional
@@ -184,7 +184,7 @@ class ModelSection(Section):
     initial_rate : {"unknown", "zero"}, optional
         Initial rate of each recording, either estimated or zero.
     initial_rate_sigma : float, optional
-        Prior standard deviation of an unknown initial rate, by default that of the model [rad/s].
+        Prior standard deviation of an unknown initial rate, by default 0.1 [rad/s].
     plugins : sequence of Path, optional
         User-supplied Python files that register effects, sensors or design criteria.
     priors : table of effect to table of key to float, optional
@@ -287,7 +287,8 @@ class RobotSection(Section):
     urdf : Path
         URDF of the robot, whose root link is the base body, or MJCF, which is converted to URDF.
     link_spread : float, optional
-        Relative uncertainty of all links that are not unknowns, by default 0, which means exactly known.
+        Prior width, in log-Cholesky coordinates, of all links that are not unknowns: lengths are uncertain by about
+        that fraction, masses by twice that. By default 0, which means exactly known.
     nearest_physical : bool, optional
         Whether physically impossible link inertias are replaced by the nearest possible ones; by default they are
         refused.

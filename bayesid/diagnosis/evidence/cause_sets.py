@@ -43,7 +43,7 @@ _Key = tuple[tuple[str, ...], str | None]
 
 @dataclass(frozen=True)
 class CausePrior:
-    """How many causes a study has, and whether something generic is at work.
+    """Prior probability of one more cause, and of a cause outside the catalogue.
 
     The number of causes is geometric: one more is at work with the same probability, regardless of how many there are.
     All sets of one size are equally probable. With the default of 0.1, the named causes have the reliability of the

@@ -30,6 +30,7 @@ __all__ = [
     "add_appendix",
     "bound_rows",
     "candidate_rows",
+    "choice_text",
     "robustness_sentence",
     "sensitivity_rows",
     "torque_rows",
@@ -40,24 +41,47 @@ GLOSSARY = (
     ("chi-square per sample", "Mean square of the residuals in units of σ; one if the model is correct."),
     ("log evidence", "Natural logarithm of the probability of the data under a set of causes over that under none."),
     ("log BF", "Natural logarithm of the Bayes factor of a candidate alone over none."),
-    ("probability", "Of a set: evidence times prior over the sum of all sets. Of a cause: sum over the sets with it."),
-    ("class", "Causes whose effects on the model these data cannot distinguish; they share a probability."),
+    (
+        "probability",
+        "Of a set of causes: its evidence times its prior, divided by the sum of that product over all sets. Of a "
+        "cause: the sum over all sets that contain it.",
+    ),
+    ("class", "Causes whose effects these data cannot distinguish; one probability applies to all of them."),
     (
         "something unknown",
-        "Any candidate outside the catalogue: a smooth torque, force or sensor error, a pulse or a burst.",
+        "Any of the candidates that represent causes outside the catalogue: a smooth torque, force or sensor error, a "
+        "pulse of torque, a burst of a sensor, or a residual that a fit with named causes does not explain.",
     ),
     (
         "p, adjusted",
-        "Probability that noise alone makes the most significant of all tests at least this significant.",
+        "Probability that noise alone makes the most significant of all tests at least as significant as this one.",
     ),
-    ("SNR", "Signal-to-noise ratio: square root of a candidate's decrease of chi-square minus its degrees of freedom."),
+    (
+        "SNR",
+        "Signal-to-noise ratio. Of a candidate: square root of its decrease of chi-square minus its number of free "
+        "amplitudes, or 0 if that is negative. Of a noise fault: standard normal quantile of its unadjusted p.",
+    ),
     ("power", "Probability that a candidate with a size drawn from its prior would have raised the alarm."),
     ("95 % limit", "Value below which the magnitude of a quantity lies with a probability of 95 %."),
-    ("cosine", "Correlation of the signals of two causes, apart from what the model's unknowns can explain."),
+    (
+        "cosine",
+        "Correlation between the signals of two causes, after the parts that the model's unknowns can explain are "
+        "removed.",
+    ),
     ("left-out log score", "Logarithm of the density of a recording under the model fitted to the other recordings."),
     ("without, with", "Fitted with the present model, and with the named causes added to it."),
 )
 """Terms of the report and their meanings."""
+
+CHOICES = {
+    "causes half as probable": "half the prior probability of one more cause",
+    "causes twice as probable": "twice the prior probability of one more cause",
+    "unknown half as probable": "half the prior probability of a cause outside the catalogue",
+    "unknown twice as probable": "twice the prior probability of a cause outside the catalogue",
+    "bounds a decade higher": "largest plausible sizes of all causes ten times as large",
+    "floors a decade lower": "smallest sizes of all causes ten times as small",
+}
+"""What each choice of the sensitivity changes, by its name in diagnosis.json."""
 
 SEEN = 2.0  # distance from zero, in standard deviations, above which an amplitude is given and below which a limit
 
@@ -91,9 +115,10 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
             "power:",
         ],
         candidate_rows(result.candidates, result.alarm.level),
-        f"All {len(result.candidates)} candidates, each added alone to the present model, from the linear response. "
-        "Detected candidates have a size; for the others, the magnitudes lie below the given limits with 95 % "
-        "probability. Empty cells were not evaluated.",
+        f"All {len(result.candidates)} candidates, each added alone to the present model, in the linear approximation. "
+        "The probability is that of being at work, alone or with other causes. Candidates that stand out have a size; "
+        "the magnitudes of the others lie below the given limits with 95 % probability. Empty cells were not "
+        "evaluated.",
     )
 
 
@@ -150,15 +175,23 @@ def torque_rows(found: TorqueReading) -> Rows:
 def robustness_sentence(result: Diagnosis) -> str:
     """Return under which choices of the prior's numbers and of the range of scales the verdict stays the same."""
     sensitivity = result.sensitivity
-    same = [name for name in sensitivity.others if name not in sensitivity.changes]
-    text = f"The verdict would change under {len(sensitivity.changes)} of {len(sensitivity.others)} other choices."
-    return f"{text} It remains the same with {joined(same)}." if same else text
+    same = joined(choice_text(name) for name in sensitivity.others if name not in sensitivity.changes)
+    count = len(sensitivity.others)
+    if not sensitivity.changes:
+        return f"The verdict is the same under {count} other choices: {same}."
+    text = f"The verdict would change under {len(sensitivity.changes)} of {count} other choices."
+    return f"{text} It remains the same with {same}." if same else text
+
+
+def choice_text(name: str) -> str:
+    """Return what a choice of the sensitivity changes."""
+    return CHOICES.get(name, name)
 
 
 def sensitivity_rows(result: Diagnosis) -> Rows:
     """Return each choice that changes the verdict, and the verdict under it."""
     others = result.sensitivity.others
-    return [[name, verdict_text(others[name])] for name in result.sensitivity.changes]
+    return [[choice_text(name), verdict_text(others[name])] for name in result.sensitivity.changes]
 
 
 def _weighed(result: Diagnosis) -> set[str]:

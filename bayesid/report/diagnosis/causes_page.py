@@ -34,7 +34,8 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         ["causes", "probability:", "log evidence:", "size", "bound:", "share of the bound:"],
         set_rows(result, SETS),
         f"The {min(SETS, len(result.probabilities.sets))} most probable sets of causes, of "
-        f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of no cause. Sizes are "
+        f"{len(result.probabilities.sets)} weighed: single causes, and sets of up to three that extend a probable one. "
+        "The log evidence is relative to that of no cause. Sizes are "
         "root mean squares of the amplitudes that share a unit, from the linear model at the most probable scale; a "
         "size beyond its bound is implausible. For a missing or sloshing body, the mass represents all its moments.",
     )

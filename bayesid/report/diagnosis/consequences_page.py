@@ -48,9 +48,9 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
     if named and changes:
         document.figure(
             figures.parameter_forest(changes),
-            "Inertial parameters relative to their values without the named causes; bars contain 95 %. The axis is "
-            "limited to the fits: a prior that reaches beyond it is drawn as a line over the whole width. A shift "
-            "beyond the bars is an error that would otherwise have gone unnoticed.",
+            "Inertial parameters relative to their values without the named causes; bars are 95 % intervals. The "
+            "axis covers the two fits: a wider prior is a line over the whole width. A shift beyond the bars is an "
+            "error that would have gone unnoticed without the diagnosis.",
         )
     _add_disturbance(document, result)
 
@@ -64,9 +64,10 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
     if result.verdict.status is Status.ADEQUATE or (named and not (moves or result.after.faults)):
         return
     document.paragraph(
-        f"A disturbance of the base that would explain the residual{' without the named causes' if named else ''}: "
-        "a torque about, and a force through, the common centre of mass, smooth in time, with a size estimated from "
-        "the data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not included."
+        f"The residual{' without the named causes' if named else ''} was reconstructed as a disturbance of the base: "
+        "a torque about, and a force through, the common centre of mass, both smooth in time. Their size is estimated "
+        "from the data; bands are ± 1 standard deviation. The part that the model's unknowns can explain is not "
+        "included."
         + (f" {wrench_sentence(wrench)}" if named else "")  # the first page states it where nothing is named
     )
     if wrench.signal_to_noise > 0.0:
@@ -89,7 +90,6 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
         document.figure(
             figures.plot_disturbance(result, frame),
             f"Reconstructed torque and force, {AXES[frame]} axes.{'' if cause is None else dashed}",
-            floating=result.named,
         )
     if not result.named:
         document.figure(

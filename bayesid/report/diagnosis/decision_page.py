@@ -144,7 +144,7 @@ def conditions_text(hypothesis: Hypothesis) -> str:
     if nuisance:
         widths = [prior.spread for prior in nuisance]
         width = format_percent(widths[0]) if len(set(widths)) == 1 else f"{format_range(widths)} of their values"
-        links = f"links uncertain by {width}"
+        links = f"links uncertain by {width} (their masses by twice that)"
     coloured = [sensor.kind.value for sensor in posterior.model.sensors if sensor.coloured is not None]
     noise = f"noise of {', '.join(coloured)} coloured" if coloured else "noise white"
     if hypothesis.faults:

@@ -54,10 +54,11 @@ AT_MOST = 6  # largest number of quantities of one cause in a sentence
 SHOWN_SETS = 3  # sets named in the sentence of a verdict that names none
 
 FIXED = {
-    Frame.BASE: "Its direction is fixed in base axes: the source is on board.",
-    Frame.ORBIT: "Its direction is fixed in orbit axes, which turn with the orbit: the source follows the direction of "
-    "the Earth or of flight.",
-    Frame.INERTIAL: "Its direction is fixed in inertial space: the source is outside the orbit, such as the Sun.",
+    Frame.BASE: "The direction of the torque is fixed in base axes: the source is on board.",
+    Frame.ORBIT: "The direction of the torque is fixed in axes that turn with the orbit: the source follows the "
+    "direction of the Earth or of flight.",
+    Frame.INERTIAL: "The direction of the torque is fixed in inertial space: the source is outside the orbit, such as "
+    "the Sun.",
 }
 """Where the source of a disturbance is, by the axes in which it keeps its direction."""
 
@@ -236,11 +237,15 @@ def gain_sentence(result: Diagnosis) -> str:
 def wrench_sentence(wrench: DisturbingWrench) -> str:
     """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
-        return "A free torque and force on the base would explain no more than noise alone."
-    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes its direction is fixed is undecided."
+        return "No torque or force on the base would explain more of the residual than noise alone."
+    where = (
+        FIXED[wrench.fixed_in]
+        if wrench.fixed_in
+        else "The data do not determine the axes in which the torque has a fixed direction."
+    )
     strength = format_fixed(wrench.signal_to_noise, 1)
     return (
-        "Modelled as a free torque and force on the base, the disturbance has a signal-to-noise ratio of "
+        "The torque and force on the base that best explain the residual have a signal-to-noise ratio of "
         f"{strength}. {where}"
     )
 

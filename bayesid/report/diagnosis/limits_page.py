@@ -56,7 +56,7 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
         document.paragraph(
             "These manoeuvres could hardly have detected the following candidates: with a size drawn from its "
             "prior, each would have raised no alarm in more than half of all cases. Their absence from the verdict is "
-            "weak evidence that they are not at work."
+            "only weak evidence of their absence."
         )
         document.table(
             ["candidate", "power:", "95 % limits on its magnitude"],
@@ -91,14 +91,13 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     prior, probabilities, settings = result.probabilities.prior, result.probabilities, result.settings
     yield (
         f"An alarm is raised if noise alone would make the most significant of {result.alarm.tests} tests this "
-        f"significant in less than {100.0 * result.alarm.level:g} % of cases; all dependence between the tests is "
-        "included."
+        f"significant in less than {100.0 * result.alarm.level:g} % of cases; the dependence between the candidates is "
+        f"included. {_tests_text(result)}"
     )
     yield (
-        f"{len(probabilities.causes)} causes of the catalogue are possible here (the appendix lists them"
-        f"{_unlisted(result)}). In addition, {len(probabilities.generics)} candidates represent causes outside the "
-        "catalogue: "
-        f"{', '.join(probabilities.generics)}."
+        f"{len(probabilities.causes)} causes of the catalogue are possible here. In addition, "
+        f"{len(probabilities.generics)} candidates represent causes outside the catalogue: "
+        f"{', '.join(probabilities.generics)}.{_listed_text(result)}"
     )
     yield (
         "The probability of a set of causes is proportional to its evidence times its prior. The prior has two "
@@ -111,11 +110,12 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         "the resolution of the data and the physical bound is equally probable."
     )
     yield (
-        f"Causes are named if the class of each has a probability of {settings.named_from:g} or more. They explain the "
-        f"data if the candidates outside the catalogue have less than {settings.remainder_from:g}, and only a part of "
-        f"the data otherwise. Otherwise the verdict is ambiguous if two to {settings.most_alternatives} "
-        f"alternatives together reach {format_number(100.0 * settings.covered)} %, and unresolved if more are needed. "
-        "The verdict is unknown if the candidates outside the catalogue have more than half of the probability."
+        f"Causes are named if the class of each has a probability of {settings.named_from:g} or more. The data are "
+        "then explained if the candidates outside the catalogue have a probability of less than "
+        f"{settings.remainder_from:g}, and partly explained if they have more. If no cause reaches "
+        f"{settings.named_from:g}, the verdict is unknown if the candidates outside the catalogue have more than half "
+        f"of the probability, ambiguous if 2 to {settings.most_alternatives} alternatives together reach "
+        f"{format_number(100.0 * settings.covered)} %, and unresolved in all other cases."
     )
     if result.bodies_fixed:
         yield (
@@ -128,18 +128,33 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     yield f"Seed of all random numbers: {result.seed}."
 
 
-def _unlisted(result: Diagnosis) -> str:
-    """Return which causes that were considered have no linear response, so that they are no rows of the candidates."""
+def _tests_text(result: Diagnosis) -> str:
+    """Return which tests the alarm combines, in terms of the table of all candidates."""
+    listed = [row.name for row in result.candidates]
+    others = sorted({*result.alarm.candidates.log_evidence, *result.alarm.noise}.difference(listed))
+    more = f", and {joined(others)}" if others else ""
+    return f"The tests are one for each of the {len(listed)} candidates listed in the appendix{more}."
+
+
+def _listed_text(result: Diagnosis) -> str:
+    """Return which candidates have no linear response, so that they are no rows of the table of all candidates."""
     listed = {row.name for row in result.candidates}
-    others = [name for name in result.probabilities.causes if name not in listed]
-    return f", except {joined(others)}" if others else ""
+    probabilities = result.probabilities
+    others = [name for name in (*probabilities.causes, *probabilities.generics) if name not in listed]
+    if not others:
+        return " The appendix lists all of them."
+    verb = "is" if len(others) == 1 else "are"
+    return (
+        f" The appendix lists {len(listed)} of these candidates; the others ({joined(others)}) {verb} weighed without "
+        "a linear response, so that no size or limit can be given."
+    )
 
 
 def computation_sentence(result: Diagnosis) -> str:
     """Return how long each phase of the diagnosis took."""
     phases = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.seconds.items())
     total = sum(result.seconds.values())
-    return f"Time by phase: {phases}; {total:.1f} s until the verdict, excluding sampling and this report."
+    return f"Time by phase: {phases}; {total:.1f} s in total, without writing this report."
 
 
 def unseen_rows(rows: Sequence[Candidate]) -> Rows:

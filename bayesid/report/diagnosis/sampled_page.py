@@ -79,5 +79,4 @@ def add_measured(document: Document, result: Diagnosis, fits: Sequence[Sequence[
     document.figure(
         figures.measured_against_simulated(fits[strongest]),
         f"Measured and simulated readings of {result.recordings[strongest]}, sensor axes; below, the residual in σ.",
-        floating=True,
     )

@@ -26,8 +26,8 @@ class BiasJump(Events):
 
     sensor: ClassVar[SensorKind]
     separated_by = (
-        "The reading jumps but the robot does not: other sensors do not respond, and the attitude follows the old "
-        "bias. Record at rest: an instrument that jumps, for example after a range or supply change, does so at rest."
+        "The reading jumps but the motion does not: the other sensors of the base do not respond. Record at rest, "
+        "across changes of range or supply: the bias of a faulty instrument jumps at rest, too."
     )
 
     @classmethod

@@ -103,9 +103,10 @@ class JointFriction(_OnTorque):
         """Return the torque of the joint's drive, which could move nothing against more friction."""
         torque, drive = self.drive(model.robot)
         moves = f"A joint moves only if its friction is less than {drive}"
+        speed = "m/s" if model.robot.joints[self.index_in(model.robot)].kind == "prismatic" else "rad/s"
         return (
             PhysicalBound(self.parameters[0].unit, torque, f"{moves}."),
-            PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, at a speed of {SPEED:g}."),
+            PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, at a speed of {SPEED:g} {speed}."),
         )
 
     def _extra(self, values: Array, velocity: Array) -> Array:

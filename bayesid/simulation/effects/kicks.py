@@ -23,15 +23,13 @@ collision."""
 
 @register
 class Kicks(Events):
-    """Momentum and angular momentum that the robot receives from outside within much less than a sample interval.
+    """External impulses, each much shorter than a sample interval.
 
-    The received momentum is fixed in inertial space: with ``x`` the angular momentum received so far about the common
-    centre of mass, ``x = sum (J - c x P) + u``, where ``u' = -w x x + sum c' x P`` expresses it in base axes with the
-    lever of the instant. As a momentum taken from the base it changes the rate at once, for any step.
+    Each kick gives the robot a momentum and an angular momentum, which are constant in inertial space from then on.
+    The rate of the base jumps at the instant of the kick, whatever the integration step.
 
-    A sensor that samples between kicks does not measure the push itself. One kick changes the motion by
-    ``J - c x P`` alone, so that a diagnosis gives the angular momentum about the common centre of mass and no
-    momentum.
+    No sensor samples the push itself. The motion of the base depends only on the angular momentum of a kick about the
+    common centre of mass, so that is what a diagnosis reports.
 
     Parameters
     ----------
@@ -50,6 +48,8 @@ class Kicks(Events):
         "a contact recurs at the same posture, an external hit does not."
     )
     states = 3
+    # with J and P the angular momentum about the base origin and the momentum of each kick, the angular momentum about
+    # the common centre of mass is x = sum (J - c x P) + u, with u' = -w x x + sum c' x P in base axes
     most_in_recording = 3
 
     def __init__(self, place: str = "", *, momentum: bool = True) -> None:

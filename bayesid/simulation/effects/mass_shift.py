@@ -35,17 +35,14 @@ class MassShift(Effect):
 
     A mass m that moves from a to b changes the first moment by ``m (b - a)`` and the second by ``m (b b' - a a')``;
     the base's mass stays the same. The angular momentum about the common centre of mass and the attitude are the same
-    before and after; the base's rate jumps. After the instant the moments remain changed until the recording ends, and
-    the next recording begins without the change unless its instant is negative.
+    before and after; the base's rate jumps. The moments remain changed until the recording ends. The next recording
+    begins without the change unless its instant is negative. The instant is a constant of the effect; a diagnosis
+    determines it.
 
-    The instant is a constant of the effect and not a parameter, since nothing depends on it smoothly; the effect is
-    linear in the nine moments, but not in the instant. `table_at` gives its columns at any instant.
-
-    The motion itself is omitted: a mass that does not move along a line through the common centre of mass
-    turns the base while it moves, by about ``m a x (b - a)`` divided by the inertia, where a and b are taken from that
-    centre. This angle does not depend on how fast the mass moves. On a rotating base it changes the subsequent rates
-    by as much as the moments do; where only the rate is measured, a pulse of torque at the same instant can represent
-    it. The shock on an accelerometer at the instant is also omitted.
+    The motion of the mass itself is omitted. While it moves, it turns the base by about ``m a x (b - a)`` divided by
+    the inertia, where a and b are measured from the common centre of mass; the speed of the mass does not matter. On a
+    rotating base this angle changes the subsequent rates by as much as the moments do. If only the rate is measured, a
+    pulse of torque at the same instant can represent it. The shock on an accelerometer is also omitted.
 
     Parameters
     ----------

@@ -44,12 +44,9 @@ class PulseTrain(NamedTuple):
 class ThrusterPulses(Effect):
     """Force and torque about the base origin, base axes, of a thruster that fires in a regular train of pulses.
 
-    The momentum received so far follows in closed form from the accumulated firing time: with ``A`` that time, signs
-    included, ``x = A (T - c x F) + u`` is the angular momentum received about the common centre of mass, where
-    ``u' = -w x x + A c' x F``. Treated as a momentum taken from the base, it is exact even for pulses shorter than a
-    step.
-
-    The times of the pulses are constants of the effect, which is linear in force and torque.
+    The received angular momentum follows from the accumulated firing time, so that the simulation is exact even for
+    pulses shorter than an integration step. The times of the pulses are constants of the effect; force and torque are
+    its parameters.
 
     Parameters
     ----------
@@ -66,6 +63,8 @@ class ThrusterPulses(Effect):
         "The rates rise in steps, not steadily as with a leak: sample faster than the pulse length, and record longer "
         "with the arm at rest; the steps follow the clock and not the motion."
     )
+    # with A the accumulated firing time, signs included, the angular momentum about the common centre of mass is
+    # x = A (T - c x F) + u, with u' = -w x x + A c' x F
     cause_kind = "pulses"
     constant_names = ("period", "width", "alternating", "first")
     states = 3

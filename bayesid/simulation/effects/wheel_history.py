@@ -29,15 +29,14 @@ AXES = "xyz"
 
 @register
 class WheelHistory(Placed):
-    """Momentum of reaction wheels along one base axis as a piecewise linear function of time, in each recording.
+    """Unrecorded momentum of reaction wheels along one base axis, which changes during a recording.
 
-    The momentum has separate values in every recording, at 24 knots from its start to ``end``, by default ten seconds
-    apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
-    prior. While it changes, the wheel drives the base by the negative of its slope, which jumps at the knots. A
-    momentum that is constant in all recordings is `WheelMomentum`.
+    The momentum is piecewise linear in time, with separate values in every recording. Its 24 values (knots) are
+    equally spaced from the start of the recording to ``end``, by default ten seconds apart. It is constant after the
+    last knot; the data do not determine knots after the end of a recording. The reaction torque on the base is minus
+    the slope of the momentum. For a momentum that is the same in all recordings, use `WheelMomentum`.
 
-    A model does not know which channels the recordings have, so that the effect occurs in every model. Where the
-    momentum of the wheels is recorded, the parameters are what the record lacks.
+    If the momentum of the wheels is recorded, the effect is the difference between true and recorded momentum.
 
     Parameters
     ----------
