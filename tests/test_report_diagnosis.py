@@ -648,7 +648,9 @@ def test_the_sensitivity_says_under_which_choices_the_verdict_is_another(biased)
         f"The verdict would change under 1 of {len(others)} other choices. It remains the same with "
     )
     assert [name for name in others if choice_text(name) in said] == others[1:]
-    assert robustness_sentence(biased).startswith(f"The verdict is the same under {len(others)} other choices: ")
+    assert robustness_sentence(biased).startswith(
+        f"The verdict is the same under each of {len(others)} other choices: "
+    )
     assert all(choice_text(name) in robustness_sentence(biased) for name in others)
     assert set(CHOICES) == set(others)  # no name of a key reaches the reader
     assert sensitivity_rows(biased) == []

@@ -178,7 +178,7 @@ def robustness_sentence(result: Diagnosis) -> str:
     same = joined(choice_text(name) for name in sensitivity.others if name not in sensitivity.changes)
     count = len(sensitivity.others)
     if not sensitivity.changes:
-        return f"The verdict is the same under {count} other choices: {same}."
+        return f"The verdict is the same under each of {count} other choices: {same}."
     text = f"The verdict would change under {len(sensitivity.changes)} of {count} other choices."
     return f"{text} It remains the same with {same}." if same else text
 

@@ -72,7 +72,7 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
         for names in verdict.ambiguous_with
     ]
     listed = "; ".join(" ".join(row) for row in probability_rows(result, CLASSES))
-    entries.append(("Probable", f"{listed}; each alone or with others."))
+    entries.append(("Probable", f"{listed}; each cause alone or with others."))
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         entries.append(("Unexplained", wrench_sentence(result.unexplained)))
     if result.torques is not None:

@@ -132,7 +132,7 @@ def _tests_text(result: Diagnosis) -> str:
     """Return which tests the alarm combines, in terms of the table of all candidates."""
     listed = [row.name for row in result.candidates]
     others = sorted({*result.alarm.candidates.log_evidence, *result.alarm.noise}.difference(listed))
-    more = f", and {joined(others)}" if others else ""
+    more = f", and one for {joined(others)}" if others else ""
     return f"The tests are one for each of the {len(listed)} candidates listed in the appendix{more}."
 
 
@@ -145,8 +145,8 @@ def _listed_text(result: Diagnosis) -> str:
         return " The appendix lists all of them."
     verb = "is" if len(others) == 1 else "are"
     return (
-        f" The appendix lists {len(listed)} of these candidates; the others ({joined(others)}) {verb} weighed without "
-        "a linear response, so that no size or limit can be given."
+        f" The appendix lists {len(listed)} of these candidates; without a linear response, and therefore omitted "
+        f"there, {verb} {joined(others)}."
     )
 
 
