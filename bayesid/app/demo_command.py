@@ -32,7 +32,7 @@ def run(
     progress: Progress,
     seed: Seed = 0,
     effective_samples: Samples = 4000.0,
-    example: Annotated[str, typer.Option(metavar="NAME", help=f"Study: {', '.join(EXAMPLES)}.")] = "arm",
+    example: Annotated[str, typer.Option(metavar="NAME", help=f"Example study: {', '.join(EXAMPLES)}.")] = "arm",
 ) -> Iterator[str]:
     """Diagnose example recordings with a hidden cause, reveal the cause and write the report, without input files."""
     from bayesid.app.diagnose_command import diagnose_study

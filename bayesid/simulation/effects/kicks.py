@@ -67,7 +67,9 @@ class Kicks(Events):
         size = RobotSize.of(model.robot)
         angular, reason = CONTACT * size.inertia, f"A kick changes the rate of the base by at most {CONTACT:g} rad/s"
         momentum = PhysicalBound("N s", angular / size.radius, f"{reason}, acting at the base's radius.")
-        whole = PhysicalBound("N m s", angular, f"{reason}, and its inertia is {three_digits(size.inertia)} kg m2.")
+        whole = PhysicalBound(
+            "N m s", angular, f"{reason}, and the inertia of the base is {three_digits(size.inertia)} kg m2."
+        )
         return (momentum, whole) if len(self.amplitude) > 3 else (whole,)
 
     def _received(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:

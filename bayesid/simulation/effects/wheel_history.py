@@ -55,7 +55,7 @@ class WheelHistory(Placed):
     )
     separated_by = (
         "It returns its momentum to the base when it stops, and it acts with the arm at rest: record longer rest "
-        "periods before and after the motion, and repeat the motion, which the wheel need not follow."
+        "periods before and after the motion, and repeat the motion: the speed of the wheel need not repeat with it."
     )
     per_recording: ClassVar[bool] = True
     constant_names = ("end",)
