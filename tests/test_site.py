@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-NEEDED = ("mkdocs", "material", "bs4", "PyQt6.QtWebEngineCore")
+NEEDED = ("mkdocs", "material", "bs4", "jupytext", "nbconvert", "nbclient", "ipykernel", "PyQt6.QtWebEngineCore")
 
 
 def is_there(module: str) -> bool:
@@ -99,9 +100,38 @@ def test_every_link_leads_somewhere(site):
 def test_the_drawings_of_the_manual_are_on_their_pages(site):
     for name, caption in [("index", "From files to results"), ("tasks", "Frames, signs and quaternions")]:
         page = (site / f"{name}.html").read_text(encoding="utf-8")
-        figure = page.partition("<figure")[2].partition("</figure>")[0]
+        figures = [part.partition("</figure>")[0] for part in page.split("<figure")[1:]]
+        (figure,) = (one for one in figures if caption in one.partition("<figcaption")[2])
         assert "<svg" in figure, name
-        assert caption in figure.partition("<figcaption")[2], name
+
+
+def test_pictures_from_real_runs_are_on_their_pages(site):
+    for name, count in [("index", 4), ("tasks", 7), ("in-python", 1)]:
+        sources = re.findall(r'<img [^>]*src="(pictures/[^"]+)"', (site / f"{name}.html").read_text(encoding="utf-8"))
+        assert len(sources) == count, name
+        assert all((site / source).is_file() for source in sources)
+
+
+def test_the_tutorial_in_python_was_executed(site):
+    page = (site / "tutorial-in-python.html").read_text(encoding="utf-8")
+    assert "Verdict: explained, wheel-momentum" in page
+    pictures = re.findall(r'<img [^>]*src="(output_[^"]+)"', page)
+    assert len(pictures) == 3
+    assert all((site / picture).stat().st_size > 10_000 for picture in pictures)
+    cells = json.loads((site / "tutorial-in-python.ipynb").read_text(encoding="utf-8"))["cells"]
+    assert all(cell["execution_count"] for cell in cells if cell["cell_type"] == "code")
+
+
+def test_an_error_in_the_tutorial_stops_the_build(tmp_path):
+    source = tmp_path / "wrong.py"
+    source.write_text("# %%\nraise ValueError('wrong cell')\n", encoding="utf-8")
+    call = "import sys, pathlib; from studies.manual.notebook import write_notebook\n"
+    call += "write_notebook(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), 'wrong')"
+    command = [sys.executable, "-c", call, source, tmp_path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "wrong cell" in done.stderr
+    assert not (tmp_path / "wrong.md").exists()
 
 
 def test_the_index_of_the_pdf_is_not_on_the_site(site):

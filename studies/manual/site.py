@@ -1,13 +1,14 @@
 """The manual as a web site: a page for each chapter, from the same sources as the PDF.
 
-Typst exports the manual as HTML, formulas as MathML; MkDocs turns it into pages with navigation and search. Needs the
-extra ``docs``.
+Typst exports the manual as HTML, formulas as MathML; MkDocs turns it into pages with navigation and search. The
+tutorial in Python is a page more, which is executed. Needs the extra ``docs``.
 """
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ from typing import Any
 import typst
 
 from bayesid._io.errors import InputError
+from studies.manual.notebook import TITLE as TUTORIAL_TITLE
+from studies.manual.notebook import TUTORIAL, write_notebook
+from studies.manual.pictures.store import STORED
 from studies.manual.sources import sources
 
 __all__ = ["write_site"]
@@ -70,6 +74,9 @@ def write_site(folder: Path) -> None:
         If the extra ``docs`` is not installed.
     """
     try:
+        import ipykernel  # noqa: F401
+        import jupytext  # noqa: F401
+        import nbconvert  # noqa: F401
         from bs4 import BeautifulSoup
         from mkdocs.commands.build import build
         from mkdocs.config import load_config
@@ -94,15 +101,19 @@ def write_site(folder: Path) -> None:
         }
         for page, file in zip(pages, files, strict=True):
             file.write_text(page.markdown(places), encoding="utf-8")
+        shutil.copytree(STORED, docs / "pictures")
+        tutorial = write_notebook(TUTORIAL, docs, _slug(TUTORIAL_TITLE))
+        contents = [{page.title: file.name} for page, file in zip(pages, files, strict=True)]
+        contents.insert(1, {TUTORIAL_TITLE: tutorial.name})
         settings = {
             "site_name": "bayesid",
             "docs_dir": str(docs),
             "site_dir": str(folder.resolve()),
             "use_directory_urls": False,
             "theme": {"name": "material", "font": False, "features": ["toc.follow", "search.suggest"]},
-            "markdown_extensions": ["attr_list"],
+            "markdown_extensions": ["attr_list", "pymdownx.highlight", "pymdownx.superfences"],
             "plugins": ["search"],
-            "nav": [{page.title: file.name} for page, file in zip(pages, files, strict=True)],
+            "nav": contents,
             "strict": True,
         }
         file = Path(work) / "mkdocs.yml"

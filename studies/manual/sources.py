@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 from studies.manual.content import content
+from studies.manual.pictures.store import STORED
 
 __all__ = ["sources"]
 
@@ -24,5 +25,6 @@ def sources(folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for file in PROSE.parent.glob("*.typ"):
         shutil.copy(file, folder)
+    shutil.copytree(STORED, folder / "pictures", dirs_exist_ok=True)
     (folder / "content.json").write_text(json.dumps(content()), encoding="utf-8")
     return folder / PROSE.name
