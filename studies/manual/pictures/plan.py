@@ -53,7 +53,7 @@ def draw(folder: Path) -> Figure:
     sds.barh(rows, [planned[name] / sd for name, sd in now.items()], color=AFTER, height=0.6)
     sds.axvline(1.0, color="black", linewidth=0.8, linestyle="--")
     sds.set_yticks(rows, [name.partition(".")[2] for name in now])
-    sds.set(title="predicted sd", xlabel="sd / sd of the three recordings")
+    sds.set(title="predicted sd", xlabel="sd / sd before", xlim=(0.0, 1.05))
     for panel in (limits, sds):
         panel.grid(visible=False, axis="y")
     return figure
@@ -66,14 +66,13 @@ def reading(folder: Path) -> str:
     uncertain = (
         "Every limit is satisfied with 99 % probability. "
         if best["go"]
-        else "The prior of this study is so wide that not every limit is satisfied with 99 % probability; `posterior` "
-        "of an earlier identification makes it narrower. "
+        else "Not every limit is satisfied with 99 % probability. "
     )
     return (
         f"Left: the recommended motion, {format_number(best['duration'])} s from rest to rest. Middle: how far it uses "
         f"its limits at the prior's centre; no bar may pass the dashed line. {uncertain}Right: the standard deviations "
-        "that it alone gives, relative to those of the three recordings of 160 s; that of the mass is "
-        f"{format_number(mass, 2)} kg instead of {format_number(now['base_link.mass'], 2)} kg."
+        "with it, relative to those of the three recordings (the prior of this study); that of the mass goes from "
+        f"{format_number(now['base_link.mass'], 2)} to {format_number(mass, 2)} kg."
     )
 
 
