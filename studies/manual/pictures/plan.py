@@ -41,7 +41,8 @@ def draw(folder: Path) -> Figure:
         angle = recording.channels[f"position.{name}"]
         joints.plot(recording.time, angle, label=name, **curve_style(index))
     joints.set(title=best["name"], xlabel="time [s]", ylabel="joint angle [rad]")
-    joints.legend(loc="best", handlelength=1.2)
+    joints.set_ylim(top=1.5 * joints.get_ylim()[1])
+    joints.legend(ncols=2, loc="upper center", handlelength=1.0, columnspacing=0.8)
     used = [one for one in best["limits"].items() if one[1]["limit"]]
     rows = np.arange(len(used))[::-1]
     limits.barh(rows, [100.0 * one["largest"] / one["limit"] for _, one in used], color=BEFORE, height=0.5)
