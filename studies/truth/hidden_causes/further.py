@@ -17,7 +17,7 @@ from studies.truth import mujoco as mj
 from studies.truth import wheels
 from studies.truth.bodies import SERVICER4
 from studies.truth.hidden_causes import causes as hide
-from studies.truth.hidden_causes.catalogue import CASES, Case, hidden_case
+from studies.truth.hidden_causes.catalogue import CASES, Build, Case, hidden_case
 from studies.truth.hidden_causes.causes import Generator, Options, direction, triple
 from studies.truth.mujoco.study import Study
 from studies.truth.numerics import Array, cross
@@ -64,13 +64,13 @@ def _by_axes(sensor: str, change: Callable[[Truth], Array]) -> Options:
 
 def g_sensitive_gyro(draw: Generator, strength: float) -> Options:
     """Rate sensor that errs in proportion to the acceleration that it feels [rad/s per m/s2]."""
-    matrix = 0.02 * strength * draw.uniform(-1.0, 1.0, (3, 3))
+    matrix = 7e-3 * strength * draw.uniform(-1.0, 1.0, (3, 3))
     return _by_axes("rate", lambda truth: truth.accel @ matrix.T)
 
 
 def curved_accelerometer(draw: Generator, strength: float) -> Options:
     """Accelerometer that errs by a multiple of the acceleration's square along each axis [s2/m]."""
-    curvature = direction(draw, 40.0 * strength)
+    curvature = direction(draw, 3.0 * strength)
     return _by_axes("accel", lambda truth: curvature * truth.accel**2)
 
 
@@ -81,14 +81,13 @@ def breathing_bias(draw: Generator, strength: float) -> Options:
 
 
 def saturated_gyro(draw: Generator, strength: float) -> Options:
-    """Rate sensor that cannot read beyond a limit, which a few samples of each axis reach."""
-    share = 0.03 * strength
+    """Rate sensor that cannot read beyond a limit, which a few samples of each axis exceed by up to so much [rad/s]."""
+    beyond = 6e-5 * strength
 
     def distort(table: Table, truth: Truth) -> None:
         for axis in range(3):
             true = truth.rate[:, axis]
-            low, high = np.quantile(true, [share, 1.0 - share])
-            table[f"rate.{'xyz'[axis]}"] += np.clip(true, low, high) - true
+            table[f"rate.{'xyz'[axis]}"] += np.clip(true, true.min() + beyond, true.max() - beyond) - true
 
     return {"distort": distort}
 
@@ -191,9 +190,9 @@ WHEEL_CASES = (
     WheelCase(
         "null, noisy tachometers", (), lambda strength: wheels.Fault(), wheels.Slews(duration=120.0, speed_sigma=0.02)
     ),
-    WheelCase("wheel-inertia:wheel1", ("wheel-inertia:wheel1",), lambda s: wheels.Fault(inertia=1.0 + 5e-4 * s)),
-    WheelCase("wheel-tilt:wheel1", ("wheel-tilt:wheel1",), lambda s: wheels.Fault(tilt=(5e-4 * s, -5e-4 * s))),
-    WheelCase("wheel-latency:wheel1", ("wheel-latency:wheel1",), lambda s: wheels.Fault(delay=0.01 * s)),
+    WheelCase("wheel-inertia:wheel1", ("wheel-inertia:wheel1",), lambda s: wheels.Fault(inertia=1.0 + 1.5e-4 * s)),
+    WheelCase("wheel-tilt:wheel1", ("wheel-tilt:wheel1",), lambda s: wheels.Fault(tilt=(7e-5 * s, -7e-5 * s))),
+    WheelCase("wheel-latency:wheel1", ("wheel-latency:wheel1",), lambda s: wheels.Fault(delay=8e-4 * s)),
 )
 
 
@@ -212,7 +211,13 @@ def _inside(name: str, cause: str, accept: tuple[str, ...] = ()) -> Case:
 def _fast(case: Case) -> Case:
     """Return a case in the telemetry of a 1 kHz inertial unit."""
     fixed = {**case.fixed, "sensors": {**FAST, **FAST_NOISE}, "manoeuvres": SHORT, "latitudes": [0.4, 2.9]}
-    return replace(case, name=f"{case.name} at 1 kHz", fixed={**fixed, "flown": 0.05})
+    builds = tuple(partial(_stronger, build) for build in case.builds)
+    return replace(case, name=f"{case.name} at 1 kHz", builds=builds, fixed={**fixed, "flown": 0.05})
+
+
+def _stronger(build: Build, draw: Generator, strength: float) -> Options:
+    """Hide a cause with three times its strength, since the recordings are shorter and fewer."""
+    return build(draw, 3.0 * strength)
 
 
 FURTHER_CASES: tuple[Case | WheelCase, ...] = (
