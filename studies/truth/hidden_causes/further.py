@@ -136,7 +136,7 @@ class Swinging(mj.Mover):
 def creeping_mass(draw: Generator, strength: float) -> Options:
     """Mass that creeps through the base for as long as a recording takes, as propellant between two tanks does."""
     body = mj.Body(6.0, direction(draw, 0.4), 0.01 * np.eye(3))
-    return {"hidden": mj.Hidden(movers=[mj.Mover(body, triple(direction(draw)), 0.05 * strength, 5.0, 130.0)])}
+    return {"hidden": mj.Hidden(movers=[mj.Mover(body, triple(direction(draw)), 0.25 * strength, 5.0, 130.0)])}
 
 
 def quadratic_drag(draw: Generator, strength: float) -> Options:
