@@ -7,10 +7,8 @@ cannot disagree with them. It is written anew whenever a report is.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +19,7 @@ from bayesid.report import Document
 from bayesid.report.document import LinkedText
 from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, styled, wide_figure
 from studies.common.code_version import UNRECORDED
-from studies.common.study import NOT_FULL, Goal, Verdict
+from studies.common.study import NOT_FULL, Severity, Verdict
 
 
 @dataclass(frozen=True)
@@ -54,45 +52,19 @@ ORDER = tuple(SECTIONS)
 COLOURS = {Verdict.PASS: AFTER, Verdict.FAIL: BEFORE, Verdict.OPEN: "#b0b0b0", Verdict.NOT_TESTED: "#e4e4e4"}
 
 
-class Severity(StrEnum):
-    """What a missed goal means to a user."""
-
-    HIGH = "high"
-    MEDIUM = "medium"
-    LOW = "low"
-
-
-MEANING = {
-    Severity.HIGH: "an answer or its stated uncertainty may be wrong",
-    Severity.MEDIUM: "an answer is missing or less precise than required, and is stated as such",
-    Severity.LOW: "an answer takes more time or memory than required",
-}
-
-# goals on time, memory and cost, and goals on the truth of what is stated, by their texts
-COSTLY = re.compile(
-    r"times faster|\b[Tt]ime (?:of|with)|minutes|at most [\d.]+ (?:s|ms|GB)\b|within (?:a further )?\d+ s\b"
-    r"|evaluations per"
-)
-TRUTH = re.compile(
-    r"stated|wrongly|wrong (?:unit|name)|misnamed|false|contain|truth|band|uniform|chi-square|too narrow|[Rr]ealised"
-    r"|standard errors of|region|unclear|reference"
-)
-
-
-def severity(text: str) -> Severity:
-    """Return what it means that the goal with this text is missed."""
-    return Severity.LOW if COSTLY.search(text) else Severity.HIGH if TRUTH.search(text) else Severity.MEDIUM
-
-
 BESIDE = ("manual", "validation")  # files among the reports that are no studies
+UNSTATED = "not stated"  # severity of a goal in a summary that was written before goals had one
 
 
 class Judged(NamedTuple):
-    """A goal with its subject and the study that judges it."""
+    """A goal of a summary, with its subject and the study that judges it."""
 
     subject: str
     study: str
-    goal: Goal
+    text: str
+    reached: str
+    verdict: Verdict
+    severity: str  # that of a miss, or `UNSTATED`
 
 
 def judged(folder: Path) -> list[Judged]:
@@ -102,7 +74,7 @@ def judged(folder: Path) -> list[Judged]:
     for subject in _subjects(summaries):
         for study in subject.studies:
             goals = summaries.get(study, {"goals": []})["goals"]
-            goals_by_subject += [Judged(subject.question, study, _goal(goal)) for goal in goals]
+            goals_by_subject += [_judged(subject.question, study, goal) for goal in goals]
     return goals_by_subject
 
 
@@ -130,7 +102,7 @@ def write_validation(folder: Path, output: Path) -> None:
     for verdict in ORDER:
         if verdict is Verdict.PASS:
             _answers(document, summaries)
-        chosen = [goal for goal in goals if goal.goal.verdict is verdict]
+        chosen = [goal for goal in goals if goal.verdict is verdict]
         if chosen:
             document.section(SECTIONS[verdict])
             _goals(document, chosen, verdict)
@@ -144,15 +116,22 @@ def write_validation(folder: Path, output: Path) -> None:
 def _goals(document: Document, goals: Sequence[Judged], verdict: Verdict) -> None:
     """Add the table of goals with one verdict; missed ones have their severity and begin with the most severe."""
     header, caption = ["study", "goal", "measured"], f"Goals with the verdict {verdict.value}."
-    rows = [[_named(goal.study), goal.goal.text, goal.goal.reached] for goal in goals]
+    rows = [[_named(goal.study), goal.text, goal.reached] for goal in goals]
     if verdict is Verdict.FAIL:
         header.append("severity")
-        caption += " Severity: " + "; ".join(f"{name}: {meaning}" for name, meaning in MEANING.items()) + "."
-        severities = [severity(goal.goal.text) for goal in goals]
+        caption += f" Severity: {severities()}."
         rows = [
-            [*row, one.value] for name in Severity for row, one in zip(rows, severities, strict=True) if one is name
+            [*row, name]
+            for name in (*(severity.value for severity in Severity), UNSTATED)
+            for row, goal in zip(rows, goals, strict=True)
+            if goal.severity == name
         ]
     document.table(header, rows, caption, ["left"] * len(header))
+
+
+def severities() -> str:
+    """Return what each severity of a missed goal means, for a sentence."""
+    return "; ".join(f"{severity}: {severity.meaning}" for severity in Severity)
 
 
 def _named(study: str) -> LinkedText:
@@ -168,7 +147,7 @@ def verdict_figure(goals: Sequence[Judged]) -> Figure:
     axes = figure.subplots()
     place, left = np.arange(len(studies)), np.zeros(len(studies))
     for verdict in ORDER[::-1]:
-        chosen = [goal.study for goal in goals if goal.goal.verdict is verdict]
+        chosen = [goal.study for goal in goals if goal.verdict is verdict]
         counts = np.array([chosen.count(study) for study in studies])
         if counts.any():
             axes.barh(place, counts, 0.7, left=left, color=COLOURS[verdict], label=verdict.value)
@@ -201,12 +180,13 @@ def _subjects(summaries: Mapping[str, Any]) -> list[Subject]:
     return [*SUBJECTS, *([Subject("Other studies", others)] if others else [])]
 
 
-def _goal(entry: Mapping[str, str]) -> Goal:
-    return Goal(entry["text"], entry["reached"], Verdict(entry["verdict"]))
+def _judged(subject: str, study: str, entry: Mapping[str, str]) -> Judged:
+    verdict, severity = Verdict(entry["verdict"]), entry.get("severity", UNSTATED)
+    return Judged(subject, study, entry["text"], entry["reached"], verdict, severity)
 
 
 def _count(goals: Sequence[Judged], verdict: Verdict) -> int:
-    return sum(goal.goal.verdict is verdict for goal in goals)
+    return sum(goal.verdict is verdict for goal in goals)
 
 
 def _caution(summaries: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, str]]:
@@ -219,7 +199,7 @@ def _caution(summaries: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, str
 def _where(goals: Sequence[Judged]) -> str:
     missed: dict[str, int] = {}
     for goal in goals:
-        if goal.goal.verdict is Verdict.FAIL:
+        if goal.verdict is Verdict.FAIL:
             missed[goal.study] = missed.get(goal.study, 0) + 1
     return (
         "missed by " + ", ".join(f"{name} ({number})" for name, number in missed.items()) if missed else "none missed"

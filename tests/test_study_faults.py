@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesid._io.words import joined
 from studies.faults import STUDY, Result, attempt, tasks
-from studies.faults.kills import content_of, half_written, kill_and_resume
+from studies.faults.kills import COMMANDS, content_of, half_written, kill_and_resume
 from studies.faults.surroundings import FULL, SURROUNDINGS, can_fill_a_disk
 from tests.pdf_text import PdfText
 
@@ -62,16 +63,28 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     STUDY.write(Result(made, ["a trial broke"]), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
     assert text.row("No unclear answer to a corrupted file", "1 of 7; 4 refused, 2 accepted", "FAIL")
-    assert text.row("a full disk: one clear error", "refused", "PASS")
-    closed = "a folder that cannot be written: one clear error"
-    assert text.row(closed, "not run; see tests/test_faults.py", "NOT TESTED")
+    around = f"One clear error: {joined(SURROUNDINGS)}"
+    others = joined([title for title in SURROUNDINGS if title != FULL])
+    reached = f"1 of {len(SURROUNDINGS)}; not run (see tests/test_faults.py): {others}"
+    assert text.row(around, reached, "NOT DECIDED")
     assert text.row("No partly written file after a kill", "1 file after 2 kills", "FAIL")
-    assert text.row("design: same result after kills", "2 kills", "FAIL")
-    assert text.row("loop: same result after kills", "0 kills", "NOT TESTED")
+    resumed = ", ".join(f"{name} {'2 kills, other result' if name == 'design' else '0 kills'}" for name in COMMANDS)
+    assert text.row(f"Same result after kills: {joined(COMMANDS)}", resumed, "FAIL")
     unmoved = "cache of another version: no effect"
     assert text.row(unmoved, "not run; for a damaged cache file see tests/test_kept_jit.py", "NOT TESTED")
     for part in ("KeyError", "not refused", "other files", "a trial broke"):
         assert part in text
+    made[2] = {**made[2], "refused": False}
+    STUDY.write(Result(made, []), tmp_path / "faults.pdf")
+    refusals = f"0 of {len(SURROUNDINGS)}; not refused: {FULL}; not run (see tests/test_faults.py): {others}"
+    assert PdfText.read(tmp_path / "faults.pdf").row(around, refusals, "FAIL")
+    made[2:] = [{"around": title, "refused": True, "said": "Error"} for title in SURROUNDINGS]
+    made += [{**killed, "kill": name, "half_written": [], "same": True} for name in COMMANDS]
+    STUDY.write(Result(made, []), tmp_path / "faults.pdf")
+    text = PdfText.read(tmp_path / "faults.pdf")
+    assert text.row(around, f"{len(SURROUNDINGS)} of {len(SURROUNDINGS)}", "PASS")
+    resumed = ", ".join(f"{name} 2 kills" for name in COMMANDS)
+    assert text.row(f"Same result after kills: {joined(COMMANDS)}", resumed, "PASS")
 
 
 @pytest.mark.parametrize(

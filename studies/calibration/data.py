@@ -59,6 +59,11 @@ class Case(StrEnum):
     PLANAR = "MuJoCo, planar robot"
     PLANAR_REST = "MuJoCo, planar robot from rest"
 
+    @property
+    def label(self) -> str:
+        """What a reader calls it; the value names it in stored trials."""
+        return self.value.replace("known to 5 %", "uncertain by 5 %")
+
 
 # number of replicates of each case in the full study
 REPLICATES = {

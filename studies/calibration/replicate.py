@@ -347,7 +347,7 @@ class Coverage:
 
 def interval_coverage(cases: Sequence[Replicates]) -> dict[tuple[str, float], Coverage]:
     """Return the coverage by importance sampling, by the name of a case or `ALL` and by level."""
-    ranks = {str(runs.case): runs.bodies() for runs in cases if len(runs.results) > 1}
+    ranks = {runs.case.label: runs.bodies() for runs in cases if len(runs.results) > 1}
     coverages = {
         (name, level): Coverage(level, *coverage(values, level)) for name, values in ranks.items() for level in LEVELS
     }

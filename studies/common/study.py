@@ -70,19 +70,43 @@ class Verdict(StrEnum):
         return cls.NOT_TESTED if passed is None else cls.PASS if passed else cls.FAIL
 
     @classmethod
+    def all_of(cls, verdicts: Iterable[Verdict]) -> Verdict:
+        """Return the verdict on a goal of several parts: FAIL where one fails, PASS only where all pass."""
+        parts = set(verdicts) or {cls.NOT_TESTED}
+        return cls.FAIL if cls.FAIL in parts else parts.pop() if len(parts) == 1 else cls.OPEN
+
+    @classmethod
     def between(cls, low: float, high: float, least: float = -np.inf, most: float = np.inf) -> Verdict:
         """Return PASS where an interval from low to high lies within the goal, FAIL where it lies beside it."""
         within, beside = least <= low and high <= most, high < least or low > most
         return cls.PASS if within else cls.FAIL if beside else cls.OPEN
 
 
+class Severity(StrEnum):
+    """What it means to a user that a goal is missed."""
+
+    HIGH = "high"
+    MEDIUM = "medium"
+    LOW = "low"
+
+    @property
+    def meaning(self) -> str:
+        """What it means to a user, in words."""
+        return {
+            Severity.HIGH: "an answer or its stated uncertainty may be wrong",
+            Severity.MEDIUM: "an answer is missing or less precise than required, and is stated as such",
+            Severity.LOW: "an answer takes more time or memory than required",
+        }[self]
+
+
 @dataclass(frozen=True)
 class Goal:
-    """A goal of a study."""
+    """A goal of a study, as a user would set it."""
 
     text: str  # what is to be reached, with its number
     reached: str  # what was reached, with its interval where there is one
     verdict: Verdict  # NOT DECIDED where the interval holds values on both sides of the goal
+    severity: Severity  # if it is missed
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy.stats import beta
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, styled, wide_figure
 from studies.common.monte_carlo import Workers
-from studies.common.study import TRIALS, CsvTable, Goal, Picture, Report, Setup, Study, Verdict
+from studies.common.study import TRIALS, CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
 from studies.conventions.trials import DRAWN, NOISES, ROBOTS, VISIBLE, Outcome
 from studies.conventions.trials import run as run_all
 
@@ -52,16 +52,19 @@ def _goals(outcomes: Sequence[Outcome]) -> list[Goal]:
             "Correct studies with any hidden cause: at most 1 in 1,000 reported to have a wrong convention",
             f"{alarms} of {looks}; with 95 % confidence at most {1e3 * _most(alarms, looks):.2g} in 1,000",
             Verdict.between(*_interval(alarms, looks), most=ALARMS),
+            Severity.HIGH,
         ),
         Goal(
             "Mistakes in readings that exceed their noise: 99 % named exactly, and corrected by their remedy",
             f"{named} of {len(wrong)}",
             Verdict.between(*_interval(named, len(wrong)), least=NAMED),
+            Severity.HIGH,
         ),
         Goal(
             "A check takes at most 5 s of processor time, with cached compiled code",
             f"{slowest:.1f} s at most",
             Verdict.of(slowest <= LONGEST),
+            Severity.LOW,
         ),
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,98 +16,105 @@ from bayesid.report.numbers import NO_VALUE, format_number, format_signed
 from studies.benchmark.run import EVALUATED
 from studies.common.provenance import MODELS, processor
 from studies.common.report_parts import columns
-from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
-from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, MANY, Cost, Run, middle, run
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
+from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, MANY, Cost, Nested, Run, middle, run
 from studies.cost.search_times import SearchTimes
 
 MEMORY = 1.5  # largest wanted memory of a diagnosis [GB]
 SAMPLES = 30.0  # longest wanted time for 4,000 effective samples of an extended model [s]
-STEP, BEGIN = 0.03, 20.0  # longest wanted times of one criterion with its gradient, and of a cold start of a search [s]
+BEGIN = 20.0  # longest wanted time of a cold start of a search [s]
 CHANGED = 0.1  # relative change of a time beside an earlier run from which it is told
-CHEAPER = 100.0  # smallest wanted ratio of one nested run for each candidate to a verdict on all of them
 
 
 def goals_of(cost: Cost) -> list[Goal]:
     """Return every goal with what was reached."""
-    goals = []
-    for kind, limits in (("with cached compiled code", "warm"), ("cold", "cold")):
-        for limit in sorted({getattr(case, limits) for case in DIAGNOSES}):
-            timed = [case for case in DIAGNOSES if case.title in cost.diagnoses]
-            names = [case.title for case in timed if getattr(case, limits) == limit]
-            if names:
-                goals.append(_times(cost, names, kind, limit))
+    warm = sorted({case.warm for case in DIAGNOSES})
+    goals = [_times(cost, "warm", [limit]) for limit in warm] + [_times(cost, "cold", {case.cold for case in DIAGNOSES})]
     memory = {name: max(run.memory for run in runs) for name, runs in cost.diagnoses.items()}
     worst = max(memory, key=lambda name: memory[name])
-    reached = f"{format_number(memory[worst], 3)} GB ({worst})"
-    goals.append(Goal(f"Memory of a diagnosis: at most {MEMORY:g} GB", reached, Verdict.of(memory[worst] <= MEMORY)))
     sampled = {name: run.phases["sample"] for name, run in cost.sampled.items()}
-    goals.append(
+    goals += [
+        Goal(
+            f"Memory of a diagnosis: at most {MEMORY:g} GB",
+            f"{format_number(memory[worst], 3)} GB ({worst})",
+            Verdict.of(memory[worst] <= MEMORY),
+            Severity.LOW,
+        ),
         Goal(
             f"4,000 effective samples of the extended model of a single cause within a further {SAMPLES:g} s",
             ", ".join(f"{name} {seconds:.1f} s" for name, seconds in sampled.items()) or "not sampled",
             Verdict.of(max(sampled.values()) <= SAMPLES if sampled else None),
-        )
-    )
+            Severity.LOW,
+        ),
+    ]
     for name, limit in COMMANDS.items():
         if limit is not None and name in cost.commands:
             walls = [run.wall for run in cost.commands[name][1:]]
             text = f"{name}, files to report, with cached compiled code: at most {limit:g} s"
-            goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
-    return [*goals, *_many_goals(cost.many), *_search_goals(cost.search), _nested(cost)]
+            verdict = Verdict.between(min(walls), max(walls), most=limit)
+            goals.append(Goal(text, _spread(walls), verdict, Severity.LOW))
+    return [goal for goal in (*goals, _many_goal(cost.many), _search_goal(cost.search)) if goal is not None]
 
 
-def _many_goals(many: Mapping[str, list[Run]]) -> list[Goal]:
-    """Return the goals of what was run on many recordings."""
-    goals = []
+def _times(cost: Cost, code: str, limits: Collection[float]) -> Goal | None:
+    """Return the goal on the time to the verdict, with limits of one or more groups of diagnoses; None without any."""
+    part = slice(0, 1) if code == "cold" else slice(1, None)
+    texts, told, verdicts = [], [], []
+    for limit in sorted(limits):
+        wanted = [case.title for case in DIAGNOSES if case.title in cost.diagnoses and getattr(case, code) == limit]
+        each = {name: [run.to_verdict for run in cost.diagnoses[name][part]] for name in wanted}
+        if each:
+            texts.append(f"at most {limit:g} s for {', '.join(each)}")
+            told += [f"{name} {_spread(values)}" for name, values in each.items()]
+            verdicts += [Verdict.between(min(values), max(values), most=limit) for values in each.values()]
+    if not texts:
+        return None
+    kind = "cold" if code == "cold" else "with cached compiled code"
+    text = f"Files to verdict, {kind}: {'; '.join(texts)}"
+    return Goal(text, ", ".join(told), Verdict.all_of(verdicts), Severity.LOW)
+
+
+def _many_goal(many: Mapping[str, list[Run]]) -> Goal | None:
+    """Return the goal of what was run on many recordings; None where nothing was."""
+    texts, told, verdicts = [], [], []
     for row in MANY:
         if row.title in many:
             warm = many[row.title][-1]
             seconds = warm.to_verdict if row.command == "diagnose" else warm.wall
-            text = f"{row.title}, cached compiled code: at most {row.seconds:g} s and {row.memory:g} GB"
-            reached = f"{seconds:.0f} s, {format_number(warm.memory, 2)} GB"
-            goals.append(Goal(text, reached, Verdict.of(seconds <= row.seconds and warm.memory <= row.memory)))
-    return goals
+            texts.append(f"{row.title}: {row.seconds:g} s and {row.memory:g} GB")
+            told.append(f"{seconds:.0f} s, {format_number(warm.memory, 2)} GB")
+            verdicts.append(Verdict.of(seconds <= row.seconds and warm.memory <= row.memory))
+    if not texts:
+        return None
+    text = f"Many recordings, with cached compiled code, at most: {'; '.join(texts)}"
+    return Goal(text, "; ".join(told), Verdict.all_of(verdicts), Severity.LOW)
 
 
-def _search_goals(search: SearchTimes | None) -> list[Goal]:
-    step = f"One evaluation of a design criterion with its gradient, one core: at most {1e3 * STEP:g} ms"
-    begin = f"Cold start of a search for manoeuvres: at most {BEGIN:g} s"
+def _search_goal(search: SearchTimes | None) -> Goal:
+    text = f"Cold start of a search for manoeuvres: at most {BEGIN:g} s"
     if search is None:
-        return [Goal(text, "not measured", Verdict.NOT_TESTED) for text in (step, begin)]
+        return Goal(text, "not measured", Verdict.NOT_TESTED, Severity.LOW)
+    reached = f"{search.cold:.1f} s, {search.warm:.1f} s with cached compiled code"
+    return Goal(text, reached, Verdict.of(search.cold <= BEGIN), Severity.LOW)
+
+
+def _criterion(search: SearchTimes) -> str:
     low, middle_of, high = (1e3 * value for value in np.percentile(search.criterion, [5.0, 50.0, 95.0]))
-    criterion = (
-        f"{middle_of:.1f} ms ({low:.1f} to {high:.1f}, 90 % of {len(search.criterion)} manoeuvres of {search.unknowns} "
-        "free numbers)"
+    return (
+        f"One evaluation of a design criterion with its gradient takes {middle_of:.1f} ms on one core ({low:.1f} to "
+        f"{high:.1f}, 90 % of {len(search.criterion)} manoeuvres of {search.unknowns} free numbers)."
     )
-    start = f"{search.cold:.1f} s, {search.warm:.1f} s with cached compiled code"
-    return [
-        Goal(step, criterion, Verdict.of(middle_of <= 1e3 * STEP)),
-        Goal(begin, start, Verdict.of(search.cold <= BEGIN)),
-    ]
 
 
-def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
-    part = slice(0, 1) if kind == "cold" else slice(1, None)
-    each = {name: [run.to_verdict for run in cost.diagnoses[name][part]] for name in names}
-    said = ", ".join(f"{name} {_spread(values)}" for name, values in each.items())
-    verdicts = [Verdict.between(min(values), max(values), most=limit) for values in each.values()]
-    worst = next((verdict for verdict in (Verdict.FAIL, Verdict.OPEN) if verdict in verdicts), Verdict.PASS)
-    return Goal(f"Files to verdict, {kind}: at most {limit:g} s for {', '.join(names)}", said, worst)
-
-
-def _nested(cost: Cost) -> Goal:
-    text = f"Time of one dynesty run per candidate over that of the verdict on all of them: at least {CHEAPER:g} times"
-    if cost.nested is None:
-        return Goal(text, "dynesty is not installed", Verdict.NOT_TESTED)
+def _nested(cost: Cost, one: Nested) -> str:
     count, seconds = max(cost.candidates.items())
-    ratio = cost.nested.seconds * count / seconds
-    bound = "" if cost.nested.done else "more than "
-    said = (
-        f"{bound}{format_number(ratio, 2)}: {count} candidates, "
-        f"{'' if cost.nested.done else 'not finished after '}{cost.nested.seconds:.0f} s of processor time with "
-        f"{cost.nested.unknowns} unknowns"
+    ratio = one.seconds * count / seconds
+    unfinished = "" if one.done else ", in which it did not finish"
+    return (
+        f"One run of dynesty with {one.unknowns} unknowns takes {one.seconds:.0f} s of processor time{unfinished}. One "
+        f"run for each of {count} candidates would take {'' if one.done else 'more than '}{format_number(ratio, 2)} "
+        "times as long as the verdict on all of them."
     )
-    return Goal(text, said, Verdict.PASS if ratio >= CHEAPER else Verdict.FAIL if cost.nested.done else Verdict.OPEN)
 
 
 def _spread(values: Sequence[float]) -> str:
@@ -263,6 +270,10 @@ def _growth(document: Document, cost: Cost) -> None:
         f"{format_number(floor.seconds / floor.least, 2)} times above that bound, as is usual for small matrices and "
         "short loops."
     )
+    if cost.search is not None:
+        document.paragraph(_criterion(cost.search))
+    if cost.nested is not None:
+        document.paragraph(_nested(cost, cost.nested))
 
 
 @styled

@@ -231,9 +231,6 @@ class Result:
     curves: Mapping[tuple[str, bool], Sequence[float]]
     # largest relative difference of the standard deviations from those that `studies.excitation` states
     difference: float
-    # number of flights of the same manoeuvre in `studies.excitation`, and smallest and largest ratio of realised to
-    # predicted errors
-    realised: tuple[int, float, float]
 
 
 def run(
@@ -258,7 +255,7 @@ def run(
         for known in (True, False)
     }
     after = {name: widths(of_manoeuvre) for name, of_manoeuvre in information.items()}
-    return Result(motion, table, after, REPETITIONS, curves, _difference(after["designed"], tables), _realised(tables))
+    return Result(motion, table, after, REPETITIONS, curves, _difference(after["designed"], tables))
 
 
 def _difference(after: Widths, folder: Path) -> float:
@@ -267,9 +264,3 @@ def _difference(after: Widths, folder: Path) -> float:
     computed = dict(zip(mission.ROWS, (after.uncertain, after.exact), strict=True))
     values = {arm: np.array([float(row[f"sd {heading}"]) for heading in HEADINGS]) for arm, row in stated.items()}
     return float(max(np.abs(computed[arm] / values[arm] - 1.0).max() for arm in mission.ROWS))
-
-
-def _realised(folder: Path) -> tuple[int, float, float]:
-    row = next(row for row in read_rows(folder / "excitation-realised.csv") if row["manoeuvre"] == DESIGN)
-    ratios = [float(row[f"rms / predicted sd, {heading}"]) for heading in HEADINGS]
-    return int(row["flights"]), min(ratios), max(ratios)

@@ -29,13 +29,12 @@ from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.provenance import MODELS
 from studies.common.quantities import HEADINGS, ROWS
 from studies.common.report_parts import add_number_table
-from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Severity, Statement, Study, Verdict
 from studies.ets7_limits.analysis import LONGEST, Answer, Result, run
 
 YEAR = 3.156e7  # length of a year [s]
 
-# largest relative sd that is wanted, and largest differences from another report and from realised errors
-WANTED, ALIKE, WITHIN = 0.01, 0.01, 0.05
+WANTED = 0.01  # largest relative sd that is wanted
 
 USUAL = ("10⁻⁵ rad/s", "10⁻⁵")  # labels of the mission's sensors
 
@@ -54,37 +53,12 @@ def time_needed(answer: Answer, duration: float) -> str:
 
 
 def goals(result: Result) -> tuple[Goal, ...]:
-    """Return the goals of the study with what was reached."""
-    rows = []
-    for known, title in ((False, "uncertain by 5 % (1 sigma)"), (True, "known exactly")):
-        once = result.after["designed"].worst(known)
-        needed = time_needed(result.answers[USUAL][known, False], mission.DURATION)
-        text = f"Base's mass and moments determined to {format_percent(WANTED)} in one manoeuvre, arm {title}"
-        reached = f"{format_percent(once, 2)} after one; time until {format_percent(WANTED)}: {needed}"
-        rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
-    rows.append(
-        Goal(
-            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on excitation, same "
-            "manoeuvre",
-            f"{format_percent(result.difference, 2)} at most, for both uncertainties of the arm",
-            Verdict.of(result.difference <= ALIKE),
-        )
-    )
-    count, least, most = result.realised
-    error = 1.0 / np.sqrt(2.0 * count)
-    away = max(1.0 - least, most - 1.0)
-    verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
-    rows.append(
-        Goal(
-            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission sensors, arm "
-            "uncertain by 5 %",
-            f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
-            "excitation)",
-            verdict,
-        )
-    )
-    rows.append(Goal("The same with the other sensors", "no flight was simulated", Verdict.NOT_TESTED))
-    return tuple(rows)
+    """Return the goal of the study with what was reached; the uncertain arm sets a floor that no manoeuvre lowers."""
+    once = result.after["designed"].worst(True)
+    needed = time_needed(result.answers[USUAL][True, False], mission.DURATION)
+    text = f"Base's mass and moments determined to {format_percent(WANTED)} in one manoeuvre, arm known exactly"
+    reached = f"{format_percent(once, 2)} after one; time until {format_percent(WANTED)}: {needed}"
+    return (Goal(text, reached, Verdict.of(once <= WANTED), Severity.MEDIUM),)
 
 
 def _report(result: Result) -> Report[Result]:
@@ -146,12 +120,19 @@ def _failures(document: Document, result: Result) -> None:
     flight, designed = result.after["flight"], result.after["designed"]
     document.items(
         [
+            "Motion alone gives no absolute scale (report on the whole system): the prior of the arm sets a floor. With "
+            f"each link's mass uncertain by 5 % (1 sigma), one designed manoeuvre gives "
+            f"{format_percent(designed.worst(False), 2)}, and no time, rate sensor or accelerometer gives less than "
+            f"{format_percent(_least(result), 2)}; {format_percent(WANTED)} takes measured joint torques or a known "
+            "thrust.",
             "After the manoeuvre of the flight the worst of mass and moments is uncertain by "
             f"{format_percent(flight.worst(False), 2)} (arm uncertain by 5 %) and "
             f"{format_percent(flight.worst(True), 2)} (arm exact), after the designed one by "
             f"{format_percent(designed.worst(False), 2)} and {format_percent(designed.worst(True), 2)}.",
             "The manoeuvre was designed for the mission sensors only; a design for other sensors would need less time "
             "with them. The smoothing of the joints was assessed on the planned motion.",
+            f"Standard deviations of this manoeuvre differ by {format_percent(result.difference, 2)} at most from those "
+            "of the report on excitation, which also compares them with errors realised in MuJoCo.",
             "The encoders' noise propagates to the accelerometer, so an accelerometer of 10⁻⁹ m/s² is not a hundred "
             "times better than one of 10⁻⁷. Collisions and true joint ranges, which are not published, are not "
             "considered.",

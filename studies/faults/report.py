@@ -18,13 +18,13 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 from matplotlib.figure import Figure
 
-from bayesid._io.words import counted
+from bayesid._io.words import counted, joined
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
 from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.common.report_parts import add_number_table
-from studies.common.study import MADE, TRIALS, Goal, Picture, Report, Study, Verdict, show
+from studies.common.study import MADE, TRIALS, Goal, Picture, Report, Severity, Study, Verdict, show
 from studies.faults.kills import COMMANDS, answers_beside_another_version, kill_and_resume
 from studies.faults.surroundings import (
     FULL,
@@ -238,13 +238,12 @@ def _conditions(document: Document, result: Result) -> None:
 
 
 def _goals(result: Result) -> list[Goal]:
-    numbers, units, around = result.numbers, result.by("unit"), result.by("around")
-    total, kills, killed = sum(numbers.values()), result.kills, result.by("kill")
+    numbers, units, killed = result.numbers, result.by("unit"), result.by("kill")
+    total, kills = sum(numbers.values()), result.kills
     broken = [name for task in killed.values() for name in task["half_written"]]
     refused = sum(task["refused"] for task in units.values())
     named = sum(task["refused"] and bool(NAMED.search(task["said"])) for task in units.values())
-    answers = {name: killed.get(name, {"kills": 0, "same": False}) for name in COMMANDS}
-    goals = [
+    goals = (
         (
             "No unclear answer to a corrupted file",
             f"{numbers['faulty']} of {total}; {numbers['refused']} refused, {numbers['accepted']} accepted",
@@ -263,34 +262,55 @@ def _goals(result: Result) -> list[Goal]:
             not broken,
             kills > 0,
         ),
-        *(
-            (f"{name}: same result after kills", counted(task["kills"], "kill"), task["same"], task["kills"] > 0)
-            for name, task in answers.items()
-        ),
-    ]
+    )
     return [
-        *(Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals),
-        *(_refused(title, around.get(title)) for title in SURROUNDINGS),
+        *(
+            Goal(goal, reached, Verdict.of(passed if tested else None), Severity.HIGH)
+            for goal, reached, passed, tested in goals
+        ),
+        _resumed(killed),
+        _refused(result.by("around")),
         _unmoved(next((task for task in result.made if "cache" in task), None)),
     ]
 
 
-def _refused(title: str, task: Made | None) -> Goal:
-    text = f"{title}: one clear error"
-    if task is None:
-        return Goal(text, "not run; see tests/test_faults.py", Verdict.NOT_TESTED)
-    return Goal(text, "refused" if task["refused"] else "not refused", Verdict.of(task["refused"]))
+def _resumed(killed: Mapping[str, Made]) -> Goal:
+    """Return the goal on what commands that are killed and resumed write in the end."""
+    text = f"Same result after kills: {joined(COMMANDS)}"
+    told, verdicts = [], []
+    for name in COMMANDS:
+        task = killed.get(name, {"kills": 0, "same": False})
+        verdicts.append(Verdict.of(task["same"] if task["kills"] else None))
+        other = ", other result" if verdicts[-1] is Verdict.FAIL else ""
+        told.append(f"{name} {counted(task['kills'], 'kill')}{other}")
+    return Goal(text, ", ".join(told), Verdict.all_of(verdicts), Severity.HIGH)
+
+
+def _refused(around: Mapping[str, Made]) -> Goal:
+    """Return the goal on the errors for faults around a run."""
+    text = f"One clear error: {joined(SURROUNDINGS)}"
+    verdicts = {title: Verdict.of(around[title]["refused"] if title in around else None) for title in SURROUNDINGS}
+    count = list(verdicts.values()).count(Verdict.PASS)
+    parts = [f"{count} of {len(verdicts)}"] + [
+        f"{words} {joined(titles)}"
+        for words, verdict in (("not refused:", Verdict.FAIL), ("not run (see tests/test_faults.py):", Verdict.NOT_TESTED))
+        if (titles := [title for title, made in verdicts.items() if made is verdict])
+    ]
+    return Goal(text, "; ".join(parts), Verdict.all_of(verdicts.values()), Severity.MEDIUM)
 
 
 def _unmoved(task: Made | None) -> Goal:
     """Return the goal on a cache that another version filled."""
     text = "cache of another version: no effect"
     if task is None:
-        return Goal(text, "not run; for a damaged cache file see tests/test_kept_jit.py", Verdict.NOT_TESTED)
+        reached = "not run; for a damaged cache file see tests/test_kept_jit.py"
+        return Goal(text, reached, Verdict.NOT_TESTED, Severity.HIGH)
     if not task["differs"]:
-        return Goal(text, "not decisive: the other version gives the same result", Verdict.NOT_TESTED)
+        reached = "not decisive: the other version gives the same result"
+        return Goal(text, reached, Verdict.NOT_TESTED, Severity.HIGH)
     same = "same result as" if task["same"] else "different result than"
-    return Goal(text, f"{same} with an empty cache; the other version gives another result", Verdict.of(task["same"]))
+    reached = f"{same} with an empty cache; the other version gives another result"
+    return Goal(text, reached, Verdict.of(task["same"]), Severity.HIGH)
 
 
 def _short(said: str) -> str:
