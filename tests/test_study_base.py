@@ -17,14 +17,26 @@ from bayesid.report.figures.figure_style import styled, wide_figure
 from bayesid.report.vector_figure import VectorFigure
 from studies.common.code_version import CodeVersion
 from studies.common.provenance import study_origin
-from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
+from studies.common.study import (
+    CsvTable,
+    Finding,
+    Goal,
+    Picture,
+    Report,
+    Setup,
+    Severity,
+    Statement,
+    Study,
+    Verdict,
+    show,
+)
 from tests.pdf_text import PdfText, links_of
 from tests.report_rules import badly_written, broken_rules
 
 GOALS = (
-    Goal("error at most 2 %", "1.2 % (0.9 to 1.5 %)", Verdict.of(1.2 < 2.0)),
-    Goal("error at most 1 %", "1.2 % (1.1 to 1.5 %)", Verdict.of(False)),
-    Goal("speed", "not run", Verdict.of(None)),
+    Goal("error at most 2 %", "1.2 % (0.9 to 1.5 %)", Verdict.of(1.2 < 2.0), Severity.HIGH),
+    Goal("error at most 1 %", "1.2 % (1.1 to 1.5 %)", Verdict.of(False), Severity.MEDIUM),
+    Goal("speed", "not run", Verdict.of(None), Severity.LOW),
 )
 
 
@@ -80,6 +92,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     assert kept["origin"] == origin
     assert links_of(tmp_path / "weighing.pdf") == {"excitation.pdf", "weighing-all.csv"}
     assert [goal["verdict"] for goal in kept["goals"]] == ["PASS", "FAIL", "NOT TESTED"]
+    assert [goal["severity"] for goal in kept["goals"]] == ["high", "medium", "low"]
 
     with (tmp_path / "weighing-all.csv").open(newline="") as stream:
         assert list(csv.reader(stream)) == [["body", "mass [kg]"], ["a, b", "0.1"], ["c", "2"]]
@@ -93,6 +106,15 @@ def test_a_study_runs_with_the_options_of_its_command(tmp_path: Path, capsys):
     assert "python -m studies.weighing --seed 7" in summary["origin"]
     show(0.25, "designs")
     assert capsys.readouterr().out == "25%: designs\n"
+
+
+def test_a_goal_of_several_parts_fails_with_one_and_passes_with_all():
+    parts = Verdict.PASS, Verdict.FAIL, Verdict.OPEN, Verdict.NOT_TESTED
+    assert Verdict.all_of(parts) is Verdict.FAIL
+    assert [Verdict.all_of([part, part]) for part in parts] == list(parts)
+    for part in parts[2:]:
+        assert Verdict.all_of([Verdict.PASS, part]) is Verdict.OPEN
+    assert Verdict.all_of([]) is Verdict.NOT_TESTED
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,11 @@ def test_times_of_an_earlier_run_stand_beside_these(tmp_path: Path) -> None:
 
 
 def test_a_nested_run_is_stated_as_finished_or_not(tmp_path: Path) -> None:
-    for one, part in ((None, ""), (Nested(5.0, 25, done=False), "more than 50 times"), (Nested(5.0, 25, done=True), "50")):
+    for one, part in (
+        (None, ""),
+        (Nested(5.0, 25, done=False), "more than 50 times"),
+        (Nested(5.0, 25, done=True), "50"),
+    ):
         STUDY.write(replace(made_up(one), full=True), tmp_path / "cost.pdf")
         text = PdfText.read(tmp_path / "cost.pdf")
         assert ("dynesty" in text) is (one is not None)

@@ -37,4 +37,11 @@ def test_goals_are_counted_and_reports_without_a_summary_are_named(tmp_path):
     text = index_text(tmp_path)
     assert "All 4 goals: 1 PASS, 1 FAIL, 1 NOT DECIDED, 1 NOT TESTED." in text
     assert "| a \\| b | 1 % | FAIL |" in text
+    for goal in goals:
+        goal["severity"] = "medium"
+    (tmp_path / "one.json").write_text(json.dumps(summary))
+    text = index_text(tmp_path)
+    assert "| a \\| b | 1 % | FAIL (medium) |" in text
+    assert "| a \\| b | 1 % | PASS |" in text
+    assert "High: an answer or its stated uncertainty may be wrong; medium: " in text
     assert text.endswith("- [two](two.pdf)\n")

@@ -58,21 +58,33 @@ def verdicts(made):
 
 
 def test_the_goals_follow_from_the_trials():
-    speed = "at least 5 times faster than the best peer, 39 unknowns"
-    evidence = "log evidence within 0.1 of a long reference, 39 unknowns"
+    speed, large = (
+        f"at least 5 times faster than the best peer, {sizes} unknowns" for sizes in ("10, 19 and 39", "79")
+    )
+    evidence = "log evidence within 0.1 of a long reference, 10, 19, 39 and 79 unknowns"
     assert verdicts([])[speed] is Verdict.NOT_TESTED
-    own = [trial(39, Sampler.OURS, 10.0, 5000.0, -3.0), trial(39, REFERENCE, 90.0, 20000.0, -3.05)]
+    assert verdicts([])[evidence] is Verdict.NOT_TESTED
+
+    def own(size, reference=-3.05):
+        return [trial(size, Sampler.OURS, 10.0, 5000.0, -3.0), trial(size, REFERENCE, 90.0, 20000.0, reference)]
+
+    others = [made for size in (10, 19, 79) for made in own(size)]
+    others += [trial(size, name, 80.0, 4000.0) for size in (10, 19) for name in list(Sampler)[1:]]
     slow = [trial(39, name, 80.0, 2000.0) for name in (Sampler.NUTS, Sampler.DE)]
-    found = verdicts([*own, *slow])
+    found = verdicts([*others, *own(39), *slow])
     assert found[evidence] is Verdict.PASS
     assert found[speed] is Verdict.OPEN  # one peer is missing
+    assert found[large] is Verdict.NOT_TESTED
+    assert verdicts(own(39))[evidence] is Verdict.OPEN  # three numbers of unknowns are missing
     last = trial(39, Sampler.STRETCH, 80.0, 500.0)
-    assert verdicts([*own, *slow, last])[speed] is Verdict.PASS
+    assert verdicts([*others, *own(39), *slow, last])[speed] is Verdict.PASS
+    assert verdicts([*own(39), *slow, last])[speed] is Verdict.OPEN
     quick = trial(39, Sampler.STRETCH, 30.0, 4000.0)
-    assert verdicts([*own, *slow, quick])[speed] is Verdict.FAIL
-    assert verdicts([own[0], trial(39, REFERENCE, 90.0, 20000.0, -3.2)])[evidence] is Verdict.FAIL
-    assert verdicts([own[0], trial(39, REFERENCE, 90.0, 20000.0, -3.09)])[evidence] is Verdict.OPEN
-    assert found["at least 5 times faster than dynesty and nautilus, 39 unknowns"] is Verdict.NOT_TESTED
+    assert verdicts([*others, *own(39), *slow, quick])[speed] is Verdict.FAIL
+    assert verdicts([*others, *own(39, reference=-3.2)])[evidence] is Verdict.FAIL
+    assert verdicts([*others, *own(39, reference=-3.09)])[evidence] is Verdict.OPEN
+    sizes = {goal.text: goal.reached for goal in goals_of([*others, *own(39, reference=-3.09)])}
+    assert sizes[evidence].startswith("at most 0.090 ± 0.014 (39 unknowns); 0.050 ± 0.014 (10), ")
 
 
 def test_the_fastest_peer_is_one_with_an_estimate():
@@ -82,7 +94,7 @@ def test_the_fastest_peer_is_one_with_an_estimate():
 
     def reached(*made):
         goals = {goal.text: goal.reached for goal in goals_of([own, *made])}
-        return goals["at least 5 times faster than the best peer, 39 unknowns"]
+        return goals["at least 5 times faster than the best peer, 10, 19 and 39 unknowns"].partition("39: ")[2]
 
     assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)); 1 other more than 6.0")
     assert reached(cut).startswith("more than 6.0 (1 peer, none with an estimate)")

@@ -63,7 +63,7 @@ def test_the_whole_study_small(tmp_path):
         assert np.all(own.miss[:, 1, 0] < own.miss[:, 0, 0])
     STUDY.write(result, tmp_path / "report.pdf")
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
-    assert {goal.verdict for goal in goals(result)[:4]} == {Verdict.OPEN}  # four ships decide nothing
-    (row, own), *_ = result.rows.items()
-    wrong = replace(result, rows={row: replace(own, inside=np.repeat(np.zeros_like(own.inside), 10, axis=0))})
-    assert goals(wrong)[0].verdict is Verdict.FAIL
+    assert goals(result)[0].verdict is Verdict.OPEN  # four ships decide nothing
+    for row, own in result.rows.items():  # one wrong arm is enough
+        absent = replace(own, inside=np.repeat(np.zeros_like(own.inside), 10, axis=0))
+        assert goals(replace(result, rows={**result.rows, row: absent}))[0].verdict is Verdict.FAIL

@@ -33,7 +33,19 @@ from studies.base_parameters.structure import (
 from studies.common.ets7 import ets7
 from studies.common.provenance import MODELS
 from studies.common.report_parts import add_number_table
-from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Severity, Statement, Study, Verdict, show
+from studies.common.study import (
+    CsvTable,
+    Finding,
+    Goal,
+    Picture,
+    Report,
+    Setup,
+    Severity,
+    Statement,
+    Study,
+    Verdict,
+    show,
+)
 
 _LOWERED = str.maketrans("0123456789-", "₀₁₂₃₄₅₆₇₈₉₋")
 

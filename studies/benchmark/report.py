@@ -74,9 +74,13 @@ def goals_of(runs: Sequence[Benchmark]) -> list[Goal]:
     """Return the goals: met or missed in every run, else not decided."""
     goals = []
     for severity, figures in figures_by_goal(runs):
-        texts = [f"{name}: at {'least' if more else 'most'} {format_number(goal, 4)}" for name, _, goal, more in figures]
+        texts = [
+            f"{name}: at {'least' if more else 'most'} {format_number(goal, 4)}" for name, _, goal, more in figures
+        ]
         reached = [_spread(values) for _, values, _, _ in figures]
-        verdict = Verdict.all_of(_judged(values >= goal if more else values <= goal) for _, values, goal, more in figures)
+        verdict = Verdict.all_of(
+            _judged(values >= goal if more else values <= goal) for _, values, goal, more in figures
+        )
         goals.append(Goal("; ".join(texts), "; ".join(reached), verdict, severity))
     return goals
 

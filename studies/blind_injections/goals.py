@@ -13,7 +13,7 @@ from bayesid.diagnosis import Status
 from bayesid.report.numbers import NO_VALUE
 from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import CASES, EXPLAINING, Trial
-from studies.common.study import Goal, Verdict
+from studies.common.study import Goal, Severity, Verdict
 from studies.truth.basilisk.cases import BasiliskCase
 
 CLEAR = 7.0  # signal-to-noise ratio from which the hidden causes should be named
@@ -112,7 +112,7 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
     text = f"Inside, named at {SURE:g} or more: false names no more frequent than stated in any decade"
     named = [(trial.probability, trial.holds) for trial in trials if (trial.probability or 0.0) >= SURE]
     if not named:
-        return Goal(text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED, Severity.HIGH)
     parts, chances = [], []
     for low, high in pairwise(DECADES):
         within = [(p, holds) for p, holds in named if p is not None and low <= p and (p < high or high == 1.0)]
@@ -120,7 +120,7 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
         parts.append(f"{low:g} to {high:g}: {wrong} of {len(within)}, {stated:.1f} stated")
         chances.append(float(stats.poisson.sf(wrong - 1, stated)))
     verdict = Verdict.FAIL if min(chances) < CHANCE / len(chances) else Verdict.PASS
-    return Goal(text, f"{'; '.join(parts)}; smallest p {min(chances):.2g}", verdict)
+    return Goal(text, f"{'; '.join(parts)}; smallest p {min(chances):.2g}", verdict, Severity.HIGH)
 
 
 def _worst_kind(trials: Sequence[Trial]) -> Goal:
@@ -130,10 +130,10 @@ def _worst_kind(trials: Sequence[Trial]) -> Goal:
     for trial in trials:
         kinds.setdefault(trial.case, []).append(surely_misnamed(trial))
     if not kinds:
-        return Goal(text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED, Severity.HIGH)
     name, named = max(kinds.items(), key=lambda item: (sum(item[1]) / len(item[1]), item[0]))
     verdict = Verdict.of(sum(named) <= OF_ONE_KIND * len(named))
-    return Goal(text, f"{sum(named)} of {len(named)} ({name}), {len(kinds)} kinds", verdict)
+    return Goal(text, f"{sum(named)} of {len(named)} ({name}), {len(kinds)} kinds", verdict, Severity.HIGH)
 
 
 def in_basilisk(trials: Sequence[Trial]) -> list[Trial]:
@@ -148,12 +148,12 @@ def _wrong(trials: Sequence[Trial]) -> int:
 
 def _least(text: str, goal: float, count: int, total: int) -> Goal:
     verdict = Verdict.between(*Share(count, total).interval, least=goal) if total else Verdict.NOT_TESTED
-    return Goal(f"{text}: at least {100.0 * goal:g} %", share_text(count, total), verdict)
+    return Goal(f"{text}: at least {100.0 * goal:g} %", share_text(count, total), verdict, Severity.HIGH)
 
 
 def _most(text: str, goal: float, count: int, total: int) -> Goal:
     verdict = Verdict.between(*Share(count, total).interval, most=goal) if total else Verdict.NOT_TESTED
-    return Goal(f"{text}: at most {100.0 * goal:g} %", share_text(count, total), verdict)
+    return Goal(f"{text}: at most {100.0 * goal:g} %", share_text(count, total), verdict, Severity.HIGH)
 
 
 def _rate(text: str, goal: float, count: int, total: int) -> Goal:
@@ -162,7 +162,7 @@ def _rate(text: str, goal: float, count: int, total: int) -> Goal:
         low, high = Share(count, total).interval
         verdict = Verdict.FAIL if not low <= goal <= high else Verdict.PASS if total >= LEAST_NULLS else Verdict.OPEN
     text = f"{text}: consistent with {100.0 * goal:g} % in {LEAST_NULLS} trials"
-    return Goal(text, share_text(count, total), verdict)
+    return Goal(text, share_text(count, total), verdict, Severity.HIGH)
 
 
 def _relative(text: str, goal: float, trials: Sequence[Trial]) -> Goal:
@@ -170,22 +170,22 @@ def _relative(text: str, goal: float, trials: Sequence[Trial]) -> Goal:
     text = f"{text}: at least {goal:g}"
     limit = sum((t.detection or 0.0) * (t.naming or 0.0) for t in trials)
     if not limit:
-        return Goal(text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED, Severity.MEDIUM)
     named = Share(sum(t.named_rightly for t in trials), len(trials))
     low, high = (end * len(trials) / limit for end in named.interval)
     reached = f"{named.count / limit:.2f} ({low:.2f} to {high:.2f}): {named.count} where the limit is {limit:.1f}"
-    return Goal(text, f"{reached} of {len(trials)}", Verdict.between(low, high, least=goal))
+    return Goal(text, f"{reached} of {len(trials)}", Verdict.between(low, high, least=goal), Severity.MEDIUM)
 
 
 def _scatter(text: str, errors: np.ndarray) -> Goal:
     """Return the goal on errors in stated standard deviations: their root mean square, within two standard errors."""
     text = f"Errors of {text} in stated sd: rms {SCATTER[0]:g} to {SCATTER[1]:g}"
     if len(errors) < 2:
-        return Goal(text, NO_VALUE, Verdict.NOT_TESTED)
+        return Goal(text, NO_VALUE, Verdict.NOT_TESTED, Severity.HIGH)
     rms = float(np.sqrt((errors**2).mean()))
     error = float((errors**2).std() / (2.0 * rms * np.sqrt(len(errors))))
     verdict = Verdict.between(rms - 2.0 * error, rms + 2.0 * error, *SCATTER)
-    return Goal(text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict)
+    return Goal(text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict, Severity.HIGH)
 
 
 def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence[Trial]) -> Goal:
@@ -193,13 +193,13 @@ def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence
     text = f"Correlation of reconstructed {name} with the true ones: median at least {least:g}"
     correlations = np.sort([t.correlation for t in trials if t.case in cases and t.correlation is not None])
     if not len(correlations):
-        return Goal(text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED, Severity.MEDIUM)
     median, rank = float(np.median(correlations)), int(stats.binom.ppf(0.025, len(correlations), 0.5))
     if not rank:  # too few for an interval
-        return Goal(text, f"{median:.2f} ({len(correlations)} trials)", Verdict.OPEN)
+        return Goal(text, f"{median:.2f} ({len(correlations)} trials)", Verdict.OPEN, Severity.MEDIUM)
     low, high = float(correlations[rank - 1]), float(correlations[-rank])
     reached = f"{median:.2f} ({low:.2f} to {high:.2f}, {len(correlations)} trials)"
-    return Goal(text, reached, Verdict.between(low, high, least))
+    return Goal(text, reached, Verdict.between(low, high, least), Severity.MEDIUM)
 
 
 def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
@@ -207,13 +207,13 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     least, most = COVERAGE
     text = f"95 % intervals of amplitudes contain the truth: {100.0 * least:g} to {100.0 * most:g} %"
     if len(trials) < 2:
-        return Goal(text, NO_VALUE, Verdict.NOT_TESTED)
+        return Goal(text, NO_VALUE, Verdict.NOT_TESTED, Severity.HIGH)
     covered = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])
     counts = np.array([len(errors) for errors in trials])
     share = float(covered.sum() / counts.sum())
     error = float(np.sqrt(((covered - share * counts) ** 2).sum()) / counts.sum())
     reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum()} numbers of {len(counts)} trials)"
-    return Goal(text, reached, Verdict.between(share - 2.0 * error, share + 2.0 * error, least, most))
+    return Goal(text, reached, Verdict.between(share - 2.0 * error, share + 2.0 * error, least, most), Severity.HIGH)
 
 
 # when a verdict of each status counts as right

@@ -231,7 +231,11 @@ def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
     add_number_table(
         document,
         ["case", "rate", "accelerometer"],
-        [[runs.case.label, *(_mean(runs.chi2(sensor)) for sensor in ("rate", "accel"))] for runs in cases if runs.results],
+        [
+            [runs.case.label, *(_mean(runs.chi2(sensor)) for sensor in ("rate", "accel"))]
+            for runs in cases
+            if runs.results
+        ],
         "Mean chi-square per sample at the truth, with its standard error over replicates. In the case around one data "
         "set, half of the samples are the same in all replicates, and their mean need not be one.",
     )
@@ -248,7 +252,9 @@ def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
 def _findings(document: Document, cases: Sequence[Replicates]) -> None:
     document.section("Ranks and intervals")
     corrected = corrected_p_values(cases)
-    wrong = [f"{name} ({case.label}; p {format_p_value(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE]
+    wrong = [
+        f"{name} ({case.label}; p {format_p_value(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE
+    ]
     sentences = [
         f"Not uniform at {100.0 * FAMILYWISE:g} % family-wise: " + "; ".join(wrong) + "."
         if wrong

@@ -29,7 +29,9 @@ CHANGED = 0.1  # relative change of a time beside an earlier run from which it i
 def goals_of(cost: Cost) -> list[Goal]:
     """Return every goal with what was reached."""
     warm = sorted({case.warm for case in DIAGNOSES})
-    goals = [_times(cost, "warm", [limit]) for limit in warm] + [_times(cost, "cold", {case.cold for case in DIAGNOSES})]
+    goals = [_times(cost, "warm", [limit]) for limit in warm] + [
+        _times(cost, "cold", {case.cold for case in DIAGNOSES})
+    ]
     memory = {name: max(run.memory for run in runs) for name, runs in cost.diagnoses.items()}
     worst = max(memory, key=lambda name: memory[name])
     sampled = {name: run.phases["sample"] for name, run in cost.sampled.items()}

@@ -120,8 +120,8 @@ def _failures(document: Document, result: Result) -> None:
     flight, designed = result.after["flight"], result.after["designed"]
     document.items(
         [
-            "Motion alone gives no absolute scale (report on the whole system): the prior of the arm sets a floor. With "
-            f"each link's mass uncertain by 5 % (1 sigma), one designed manoeuvre gives "
+            "Motion alone gives no absolute scale (report on the whole system): the prior of the arm sets a floor. "
+            "With each link's mass uncertain by 5 % (1 sigma), one designed manoeuvre gives "
             f"{format_percent(designed.worst(False), 2)}, and no time, rate sensor or accelerometer gives less than "
             f"{format_percent(_least(result), 2)}; {format_percent(WANTED)} takes measured joint torques or a known "
             "thrust.",
@@ -131,8 +131,8 @@ def _failures(document: Document, result: Result) -> None:
             f"{format_percent(designed.worst(False), 2)} and {format_percent(designed.worst(True), 2)}.",
             "The manoeuvre was designed for the mission sensors only; a design for other sensors would need less time "
             "with them. The smoothing of the joints was assessed on the planned motion.",
-            f"Standard deviations of this manoeuvre differ by {format_percent(result.difference, 2)} at most from those "
-            "of the report on excitation, which also compares them with errors realised in MuJoCo.",
+            f"The standard deviations differ by at most {format_percent(result.difference, 2)} from those "
+            "in the report on excitation, which also compares them with errors realised in MuJoCo.",
             "The encoders' noise propagates to the accelerometer, so an accelerometer of 10⁻⁹ m/s² is not a hundred "
             "times better than one of 10⁻⁷. Collisions and true joint ranges, which are not published, are not "
             "considered.",

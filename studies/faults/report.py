@@ -293,7 +293,10 @@ def _refused(around: Mapping[str, Made]) -> Goal:
     count = list(verdicts.values()).count(Verdict.PASS)
     parts = [f"{count} of {len(verdicts)}"] + [
         f"{words} {joined(titles)}"
-        for words, verdict in (("not refused:", Verdict.FAIL), ("not run (see tests/test_faults.py):", Verdict.NOT_TESTED))
+        for words, verdict in (
+            ("not refused:", Verdict.FAIL),
+            ("not run (see tests/test_faults.py):", Verdict.NOT_TESTED),
+        )
         if (titles := [title for title, made in verdicts.items() if made is verdict])
     ]
     return Goal(text, "; ".join(parts), Verdict.all_of(verdicts.values()), Severity.MEDIUM)

@@ -69,18 +69,18 @@ def _goals(result: Result) -> list[Goal]:
     error = result.iterations[-1].worst
     return [
         Goal(
-            f"Mass of the load: error and sd at most {format_percent(loops.GOAL, 2)} within {loops.AT_MOST} manoeuvres, "
-            f"{TITLES['exact']}",
+            f"Mass of the load: error and sd at most {format_percent(loops.GOAL, 2)} within {loops.AT_MOST} "
+            f"manoeuvres, {TITLES['exact']}",
             f"error {format_percent(mass, 2)}, sd {format_percent(sd, 2)} after {len(exact.bodies)}; largest error of "
             f"mass and moments {format_percent(exact.worst(-1)[0], 2)}",
             Verdict.of(sd <= loops.GOAL and mass <= loops.GOAL),
             Severity.MEDIUM,
         ),
         Goal(
-            "The loop flies every step, never stops with a no-go, and its diagnosis of all recordings so far trusts the "
-            "correct model after every manoeuvre",
-            f"{counted(len(loop.bodies), 'manoeuvre')} flown, {'stopped by a no-go' if loop.status == 'no-go' else 'no no-go'}; "
-            f"trusted after {trusted} of {len(loop.reviews)}",
+            "The loop flies every step, never stops with a no-go, and its diagnosis of all recordings so far trusts "
+            "the correct model after every manoeuvre",
+            f"{counted(len(loop.bodies), 'manoeuvre')} flown, {'stopped by a' if loop.status == 'no-go' else 'no'} "
+            f"no-go; trusted after {trusted} of {len(loop.reviews)}",
             Verdict.of(loop.status != "no-go" and trusted == len(loop.reviews)),
             Severity.MEDIUM,
         ),

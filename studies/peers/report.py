@@ -19,11 +19,12 @@ from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.common.report_parts import add_number_table
-from studies.common.study import MADE, TRIALS, CsvTable, Goal, Picture, Report, Setup, Study, Verdict, show
+from studies.common.study import MADE, TRIALS, CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict, show
 from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, Recipe, attempt, lines, tasks
 from studies.peers.density import CASES
 from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
 
+MODERATE = 39  # number of unknowns up to which the goal on time is one
 FASTER = 5.0  # smallest wanted ratio of the best peer's time to the package's
 EVIDENCE = 0.1  # largest wanted error of the log evidence
 
@@ -143,36 +144,53 @@ def _density(document: Document, made: Made) -> None:
 
 
 def goals_of(made: Made) -> list[Goal]:
-    """Return the goals: speed and evidence by number of unknowns, then those of the task."""
-    speed = [goal for unknowns in sorted(CASES) for goal in _speed_goals(made, unknowns)]
-    return [*speed, *(_evidence_goal(made, unknowns) for unknowns in sorted(CASES)), *_task_goals(made)]
+    """Return the goals: speed by number of unknowns, evidence, and those of the task."""
+    few = [unknowns for unknowns in sorted(CASES) if unknowns <= MODERATE]
+    many = [unknowns for unknowns in sorted(CASES) if unknowns > MODERATE]
+    return [_speed_goal(made, few), _speed_goal(made, many), _evidence_goal(made), *_task_goals(made)]
 
 
-def _speed_goals(made: Made, unknowns: int) -> Iterator[Goal]:
+def _speed_goal(made: Made, sizes: Sequence[int]) -> Goal:
+    """Return the goal on the times with some numbers of unknowns; the worst decides."""
+    text = f"at least {FASTER:g} times faster than the best peer, {joined(map(str, sizes))} unknowns"
+    parts = {unknowns: _speed(made, unknowns) for unknowns in sizes}
+    reached = "; ".join(f"{unknowns}: {said}" if len(sizes) > 1 else said for unknowns, (said, _) in parts.items())
+    verdict = Verdict.all_of(part for _, part in parts.values())
+    return Goal(text, "not run" if verdict is Verdict.NOT_TESTED else reached, verdict, Severity.LOW)
+
+
+def _speed(made: Made, unknowns: int) -> tuple[str, Verdict]:
+    """Return the ratio of the best peer's time to the package's with so many unknowns, and what it decides."""
     package, peers = _result_of(made, unknowns, Sampler.OURS), _peers(made, unknowns)
-    text = f"at least {FASTER:g} times faster than the best peer, {unknowns} unknowns"
     if package is None or not peers:
-        yield Goal(text, "not run", Verdict.NOT_TESTED)
-        return
+        return "not run", Verdict.NOT_TESTED
     slow = () if unknowns <= NESTED else (Sampler.DYNESTY, Sampler.NAUTILUS)  # not tried with so many unknowns
     missing = [name for name in list(Sampler)[1:] if name not in peers and name not in slow]
     reached = _fastest(package, peers) + (f"; not run: {' / '.join(missing)}" if missing else "")
     below = [peer for peer in peers.values() if _needed(peer) / package["seconds"] < FASTER]
     failed = not all(map(_is_bound, below))
-    yield Goal(text, reached, Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS)
-    beyond = [name for name in slow if name not in peers]
-    if beyond:
-        text = f"at least {FASTER:g} times faster than {joined(map(str, beyond))}, {unknowns} unknowns"
-        yield Goal(text, "not run", Verdict.NOT_TESTED)
+    return reached, Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS
 
 
-def _evidence_goal(made: Made, unknowns: int) -> Goal:
-    error = _evidence_error(made, unknowns, Sampler.OURS)
-    text = f"log evidence within {EVIDENCE:g} of a long reference, {unknowns} unknowns"
-    if error is None:
-        return Goal(text, "not run", Verdict.NOT_TESTED)
-    size, sd = abs(error[0]), error[1]
-    return Goal(text, f"{size:.3f} ± {sd:.3f}", Verdict.between(size - 2.0 * sd, size + 2.0 * sd, most=EVIDENCE))
+def _evidence_goal(made: Made) -> Goal:
+    """Return the goal on the log evidence; the worst number of unknowns decides."""
+    text = f"log evidence within {EVIDENCE:g} of a long reference, {joined(map(str, sorted(CASES)))} unknowns"
+    told, verdicts = {}, []
+    for unknowns in sorted(CASES):
+        error = _evidence_error(made, unknowns, Sampler.OURS)
+        if error is None:
+            verdicts.append(Verdict.NOT_TESTED)
+            continue
+        size, sd = abs(error[0]), error[1]
+        told[unknowns] = size, f"{size:.3f} ± {sd:.3f}"
+        verdicts.append(Verdict.between(size - 2.0 * sd, size + 2.0 * sd, most=EVIDENCE))
+    if not told:
+        return Goal(text, "not run", Verdict.NOT_TESTED, Severity.HIGH)
+    worst = max(told, key=lambda unknowns: told[unknowns][0])
+    reached = f"at most {told[worst][1]} ({worst} unknowns)"
+    if others := [f"{said} ({unknowns})" for unknowns, (_, said) in told.items() if unknowns != worst]:
+        reached += f"; {', '.join(others)}"
+    return Goal(text, reached, Verdict.all_of(verdicts), Severity.HIGH)
 
 
 def _fastest(package: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]]) -> str:
@@ -193,13 +211,13 @@ def _task_goals(made: Made) -> list[Goal]:
         text = f"stated 95 % intervals contain the truth, {words}"
         errors = _errors(made, Recipe.BAYESID, hidden)
         if not len(errors):
-            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
+            goals.append(Goal(text, "not run", Verdict.NOT_TESTED, Severity.HIGH))
             continue
         inside, total = int((np.abs(errors) < SIGMAS).sum()), errors.size
         other = "".join(f"; {name} {_inside(peer)}" for name, peer in _rivals(made, hidden).items())
         # errors of one study depend on each other: a share is decided by studies, and few cannot decide
         verdict = Verdict.FAIL if inside < 0.5 * total else Verdict.OPEN
-        goals.append(Goal(text, f"{inside} of {total} in {len(errors)} studies{other}", verdict))
+        goals.append(Goal(text, f"{inside} of {total} in {len(errors)} studies{other}", verdict, Severity.HIGH))
     return goals
 
 
@@ -289,6 +307,8 @@ def _failures(document: Document, made: Made) -> None:
     sentences.append(
         f"Stopped at the time limit: {', '.join(late)}." if late else "No sampler was stopped at the time limit."
     )
+    beyond = joined(str(unknowns) for unknowns in sorted(CASES) if unknowns > NESTED)
+    sentences.append(f"{Sampler.DYNESTY} and {Sampler.NAUTILUS} were not run with {beyond} unknowns.")
     shifts = [
         (float(np.abs(np.subtract(result["mean"], reference["mean"])).max()), f"{name} ({unknowns})")
         for unknowns in CASES

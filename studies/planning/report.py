@@ -19,7 +19,19 @@ from studies.common.ets7 import BIAS, START, TIP_RATE, TIP_SPEED, ets7
 from studies.common.figures import robot_outline
 from studies.common.provenance import MODELS
 from studies.common.report_parts import add_number_table
-from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.common.study import (
+    TRIALS,
+    CsvTable,
+    Finding,
+    Goal,
+    Picture,
+    Report,
+    Setup,
+    Severity,
+    Statement,
+    Study,
+    Verdict,
+)
 from studies.ets7_limits.analysis import designed_motion
 from studies.planning.analysis import BODIES, DRAWS, EXCURSION, KINDS, SHIPS, SPREAD, STAGES, Result, Row, run
 
@@ -51,24 +63,42 @@ def _verdict(shares: list[Share]) -> Verdict:
 
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
-    rows = []
-    for row, flown in result.rows.items():
-        for stage, title in enumerate(STAGES):
-            shares = {text: flown.share(stage, *index) for index, text in REGIONS.items()}
-            least, part = min(map(_p_value, shares.values())), RISK / len(shares)
-            reached = "; ".join(f"{text} {share}" for text, share in shares.items())
-            reached += f"; smallest p {format_p_value(least)}, at least {format_number(part, 2)} required"
-            text = f"{format_percent(CONTENT)} regions contain the flown pose as often as stated, {title}, {ARMS[row]}"
-            rows.append(Goal(text, reached, _verdict(list(shares.values()))))
-    for row, flown in result.rows.items():
-        smaller = Share(int((flown.miss[:, 1] < flown.miss[:, 0]).all(axis=1).sum()), len(flown.miss))
-        text = f"The plan with the identified spacecraft has the smaller miss, position and rotation, {ARMS[row]}"
-        rows.append(Goal(text, str(smaller), Verdict.of(smaller.interval[0] > 0.5)))
+    rows, arms = result.rows, " and ".join(ARMS[row] for row in result.rows)
+    counted = {
+        f"{title}, {ARMS[row]}": {text: flown.share(stage, *index) for index, text in REGIONS.items()}
+        for row, flown in rows.items()
+        for stage, title in enumerate(STAGES)
+    }
+    least = {name: min(map(_p_value, shares.values())) for name, shares in counted.items()}
+    worst = min(least, key=lambda name: least[name])
+    others = ", ".join(format_p_value(p) for name, p in least.items() if name != worst)
+    smaller = {
+        ARMS[row]: Share(int((flown.miss[:, 1] < flown.miss[:, 0]).all(axis=1).sum()), len(flown.miss))
+        for row, flown in rows.items()
+    }
     speed, rate = result.course.largest("tip_speed"), result.course.largest("tip_rate")
-    reached = f"{format_number(1e3 * speed)} mm/s and {format_number(float(np.degrees(rate)), 2)} degrees per second"
-    within = Verdict.of(speed <= TIP_SPEED and rate <= TIP_RATE)
-    rows.append(Goal("The planned path satisfies the flight rule in MuJoCo", reached, within))
-    return tuple(rows)
+    return (
+        Goal(
+            f"{format_percent(CONTENT)} regions contain the flown pose as often as stated, planned with the "
+            f"{' and the '.join(STAGES)}, {arms} (each p at least {format_number(RISK / len(REGIONS), 2)})",
+            f"smallest p {format_p_value(least[worst])} ({worst}: "
+            f"{'; '.join(f'{text} {share}' for text, share in counted[worst].items())}); others {others}",
+            Verdict.all_of(_verdict(list(shares.values())) for shares in counted.values()),
+            Severity.HIGH,
+        ),
+        Goal(
+            f"The plan with the identified spacecraft has the smaller miss, position and rotation, {arms}",
+            "; ".join(f"{share} ({arm})" for arm, share in smaller.items()),
+            Verdict.of(all(share.interval[0] > 0.5 for share in smaller.values())),
+            Severity.MEDIUM,
+        ),
+        Goal(
+            "The planned path satisfies the flight rule in MuJoCo",
+            f"{format_number(1e3 * speed)} mm/s and {format_number(float(np.degrees(rate)), 2)} degrees per second",
+            Verdict.of(speed <= TIP_SPEED and rate <= TIP_RATE),
+            Severity.HIGH,
+        ),
+    )
 
 
 def _median(row: Row, stage: int, kind: int) -> str:

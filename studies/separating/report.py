@@ -17,7 +17,19 @@ from studies.common import mission
 from studies.common.ets7 import BIAS, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.report_parts import columns
-from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.common.study import (
+    TRIALS,
+    CsvTable,
+    Finding,
+    Goal,
+    Picture,
+    Report,
+    Setup,
+    Severity,
+    Statement,
+    Study,
+    Verdict,
+)
 from studies.separating import analysis
 from studies.separating.analysis import Result
 
@@ -64,9 +76,9 @@ def goals(result: Result) -> tuple[Goal, ...]:
         values = flown.factors[LAST]
         text = f"Hidden {NAMES[flown.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
         share = _preferred(flown, LAST)
-        rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share)))
+        rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share), Severity.MEDIUM))
         text = f"Hidden {NAMES[flown.truth]}: {analysis.FLIGHTS} sets of flights"
-        rows.append(Goal(text, f"{len(values)} flown", Verdict.of(len(values) >= analysis.FLIGHTS)))
+        rows.append(Goal(text, f"{len(values)} flown", Verdict.of(len(values) >= analysis.FLIGHTS), Severity.MEDIUM))
     for truth in analysis.RIVALS:
         share = _shown(result, truth, LAST)
         percent = format_percent(SURE)
@@ -74,7 +86,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
             f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {percent} of flights "
             f"for {percent} of the directions"
         )
-        rows.append(Goal(text, str(share), _decided(share)))
+        rows.append(Goal(text, str(share), _decided(share), Severity.MEDIUM))
     for flown in result.realised:
         gain = flown.factors[LAST] - flown.factors["first, d-optimal"]
         error = gain.std(ddof=1) / np.sqrt(len(gain))
@@ -84,7 +96,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
             f"{'higher' if gain.mean() > 0.0 else 'lower'}"
         )
         verdict = Verdict.OPEN if abs(gain.mean()) < 2.0 * error else Verdict.of(gain.mean() > 0.0)
-        rows.append(Goal(text, reached, verdict))
+        rows.append(Goal(text, reached, verdict, Severity.MEDIUM))
     far = [
         abs(flown.factors[stage].mean() - result.expected[flown.truth, stage].log_factor)
         / (flown.factors[stage].std(ddof=1) / np.sqrt(len(flown.factors[stage])))
@@ -92,11 +104,12 @@ def goals(result: Result) -> tuple[Goal, ...]:
         for stage in analysis.STAGES
     ]
     reached = f"at most {format_fixed(max(far), 1)} over {len(far)} means"
-    rows.append(Goal("Mean ln B within 3 standard errors of the expected value", reached, Verdict.of(max(far) <= 3.0)))
+    text = "Mean ln B within 3 standard errors of the expected value"
+    rows.append(Goal(text, reached, Verdict.of(max(far) <= 3.0), Severity.HIGH))
     costs = [result.designs[name].costs["separation"] for name in ("separation", "d-optimal")]
     factor = format_number(float(np.exp(costs[1] - costs[0])), 3)
     text = "By the separation criterion the separating manoeuvre is the better of the two"
-    rows.append(Goal(text, f"smaller cost by a factor of {factor}", Verdict.of(costs[0] <= costs[1])))
+    rows.append(Goal(text, f"smaller cost by a factor of {factor}", Verdict.of(costs[0] <= costs[1]), Severity.MEDIUM))
     return tuple(rows)
 
 
