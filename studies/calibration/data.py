@@ -62,7 +62,7 @@ class Case(StrEnum):
     @property
     def label(self) -> str:
         """What a reader calls it; the value names it in stored trials."""
-        return self.value.replace("known to 5 %", "uncertain by 5 %")
+        return self.value.replace("known to", "uncertain by")
 
 
 # number of replicates of each case in the full study

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
@@ -66,9 +67,9 @@ class Reference:
         return self.covariance @ self.jacobian.T
 
     @cached_property
-    def sd(self) -> Floats:
-        """Predicted standard deviations of the reported quantities."""
-        return describe(self.posterior, self.z, self.covariance).sd
+    def quantities(self) -> Floats:
+        """Predicted covariance of the reported quantities."""
+        return describe(self.posterior, self.z, self.covariance).covariance
 
     def given(self, manoeuvre: Manoeuvre) -> Posterior:
         """Return the posterior of a recording with the whitening of the plan."""
@@ -92,9 +93,14 @@ class Realised:
     """Errors of fits beside what was predicted of them."""
 
     errors: Floats  # (N, 10): estimates of the base's quantities less the truth
-    predicted: Floats  # (10,): predicted standard deviations
+    covariance: Floats  # (10, 10): predicted covariance of these errors
     # (N,): largest change of a coordinate in the last step of every fit, in predicted standard deviations
     last_step: Floats
+
+    @property
+    def predicted(self) -> Floats:
+        """Predicted standard deviations, shape (10,)."""
+        return np.sqrt(np.diag(self.covariance))
 
     @property
     def rms(self) -> Floats:
@@ -110,6 +116,53 @@ class Realised:
     def ratio(self) -> float:
         """Geometric mean of `rms`."""
         return float(np.exp(np.log(self.rms).mean()))
+
+    @cached_property
+    def whitened(self) -> Floats:
+        """Errors along the principal axes of the predicted correlations, in predicted standard deviations, (N, 10).
+
+        Where the prediction is right they are independent standard normal numbers; those of parameters are correlated.
+        """
+        sd = self.predicted
+        variances, axes = np.linalg.eigh(self.covariance / np.outer(sd, sd))
+        return np.asarray(self.errors / sd @ axes / np.sqrt(variances))
+
+    @property
+    def directions(self) -> Floats:
+        """Root mean square error of every independent direction over its predicted standard deviation, shape (10,)."""
+        return np.sqrt((self.whitened**2).mean(axis=0))
+
+    @property
+    def scale(self) -> float:
+        """Root mean square of the errors of all independent directions together, in predicted standard deviations."""
+        return float(np.sqrt((self.whitened**2).mean()))
+
+    @property
+    def p_value(self) -> float:
+        """P-value of the errors' whole covariance where the prediction is right, NaN with too few flights.
+
+        By the likelihood ratio with Bartlett's correction (Anderson 2003, section 10.8); a mean error counts as one.
+        """
+        count, size = self.whitened.shape
+        if count <= size:
+            return float("nan")
+        sample = self.whitened.T @ self.whitened / count
+        ratio = count * (np.trace(sample) - np.linalg.slogdet(sample)[1] - size)
+        correction = 1.0 - (2.0 * size + 1.0 - 2.0 / (size + 1.0)) / (6.0 * count)
+        return float(chi2.sf(correction * ratio, size * (size + 1) // 2))
+
+
+def ratio_interval(ratio: float, count: int, level: float) -> tuple[float, float]:
+    """Return the exact interval of a ratio of standard deviations that was measured by independent normal errors.
+
+    Parameters
+    ----------
+    ratio : float; root mean square error over the predicted standard deviation
+    count : int; number of errors
+    level : float; probability that the interval contains the true ratio
+    """
+    high, low = chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], count)
+    return ratio * float(np.sqrt(count / low)), ratio * float(np.sqrt(count / high))
 
 
 @dataclass(frozen=True)
@@ -145,7 +198,7 @@ def repeat(
     outcomes = run_trials(estimate, [task] * count, store, seed=seed, workers=workers, progress=progress).complete()
     shared = _reference(task.parameters, points, arm_spread)
     errors, last = (np.array([outcome[key] for outcome in outcomes]) for key in ("error", "last_step"))
-    return Realised(errors, shared.sd, last)
+    return Realised(errors, shared.quantities, last)
 
 
 def estimate(task: _Task, rng: np.random.Generator) -> dict[str, Any]:

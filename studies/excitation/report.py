@@ -15,14 +15,26 @@ from bayesid._math.arrays import Floats
 from bayesid.design import THOROUGH, Search, Store
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BAND, BEFORE, COLOURS, TRUTH, shared_legend, styled, wide_figure
-from bayesid.report.numbers import format_fixed, format_number, format_percent
+from bayesid.report.numbers import NO_VALUE, format_fixed, format_number, format_p_value, format_percent, format_range
 from studies.common import mission
 from studies.common.ets7 import BIAS, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.quantities import HEADINGS, LABELS, MASS
-from studies.common.repeated_fits import Realised
+from studies.common.repeated_fits import Realised, ratio_interval
 from studies.common.report_parts import add_number_table
-from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.common.study import (
+    TRIALS,
+    CsvTable,
+    Finding,
+    Goal,
+    Picture,
+    Report,
+    Setup,
+    Severity,
+    Statement,
+    Study,
+    Verdict,
+)
 from studies.excitation.search import FULL, QUICK, Contest, Crowd, Result, run
 
 # titles of the manoeuvres
@@ -46,6 +58,7 @@ ARMS = dict(zip(mission.ROWS, ("arm uncertain by 5 % (1 sigma)", "arm known exac
 
 # factor over the condition number that is wanted, and largest deviation of realised from predicted errors
 WANTED, WITHIN = 1.3, 0.05
+RISK = 0.05  # probability with which realised errors are called wrong although all are as predicted
 
 # number of starts that is wanted, that of a design by default, the difference per parameter that may remain between
 # their best manoeuvres, and the number of the base's parameters
@@ -58,49 +71,83 @@ SEVERAL, ROBOTS = 3, 3
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
     contest = result.contest
-    rows = []
-    for row in mission.ROWS:
-        factor = contest.factor("d-optimal", "condition-number", row)
-        text = f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, {ARMS[row]}"
-        rows.append(Goal(text, f"{factor:.2f} times", Verdict.of(factor >= WANTED)))
-    rows += _search_goals(result)
-    for name, realised in result.realised.items():
-        away = np.abs(realised.rms - 1.0)
-        low, high = away.max() - 2.0 * realised.rms_error, away.max() + 2.0 * realised.rms_error
-        verdict = Verdict.PASS if high <= WITHIN else Verdict.FAIL if low > WITHIN else Verdict.OPEN
-        reached = (
-            f"{realised.rms.min():.3f} to {realised.rms.max():.3f}, each ± {realised.rms_error:.3f}, "
-            f"{len(realised.errors)} flights; geometric mean {realised.ratio:.3f}"
-        )
-        text = f"Realised over predicted sd within {format_percent(WITHIN)} of 1 for every parameter: {TITLES[name]}"
-        rows.append(Goal(text, reached, verdict))
-    rows.append(
-        Goal(
-            "For every criterion, the manoeuvre designed by it is the best of all",
-            f"{'yes' if contest.consistent else 'no'}, {len(contest.designs)} designs",
-            Verdict.of(contest.consistent),
-        )
-    )
+    factors = {row: contest.factor("d-optimal", "condition-number", row) for row in mission.ROWS}
     kept = all(limit.kept for design in contest.designs.values() for limit in design.reached)
     finer = "on a grid eight times finer than the search's"
-    rows.append(Goal("Every limit satisfied", finer if kept else f"violated {finer}", Verdict.of(kept)))
-    return tuple(rows)
-
-
-def _search_goals(result: Result) -> list[Goal]:
     starts = f"{STARTS} starts"
-    largest = (
-        f"Largest factor over (26) from {starts}; {SEVERAL} completed searches within {format_percent(ALIKE)} of the "
-        "best known"
+    return (
+        *(
+            Goal(
+                f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, "
+                f"{ARMS[row]}",
+                f"{factor:.2f} times",
+                Verdict.of(factor >= WANTED),
+                Severity.MEDIUM,
+            )
+            for row, factor in factors.items()
+        ),
+        _largest_goal(starts, result),
+        _robots_goal(starts, result),
+        realised_goal(result.realised),
+        Goal("Every limit satisfied", finer if kept else f"violated {finer}", Verdict.of(kept), Severity.HIGH),
     )
-    near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
-    robots = _robots_goal(starts, result)
-    crowd = result.crowds.get("d-optimal")
-    if crowd is None:
-        reached = f"{_largest(result.contest)} from {result.search.starts} starts; {starts} were not run"
-        missing = Goal(near, f"{starts} were not run", Verdict.NOT_TESTED)
-        return [Goal(largest, reached, Verdict.NOT_TESTED), missing, robots]
-    return [_largest_goal(largest, result, crowd), _near_goal(near, result, crowd), robots]
+
+
+def realised_goal(flown: Mapping[str, Realised]) -> Goal:
+    """Return the goal on realised errors, whose independent directions are judged, since parameters are correlated.
+
+    It is missed where one of all simultaneous intervals lies beside the goal. It is reached where the interval of all
+    directions together lies within it for every manoeuvre, which needs no correction for their number since all must,
+    and where every simultaneous interval of one direction lies within it too, or none of those that do not excludes 1
+    and the covariance does not contradict the predicted one.
+    """
+    text = (
+        f"Realised over predicted sd within {format_percent(WITHIN)} of 1 in ten independent directions, every "
+        "manoeuvre flown"
+    )
+    if not flown:
+        return Goal(text, "none flown", Verdict.NOT_TESTED, Severity.HIGH)
+    simultaneous = 1.0 - RISK / sum(1 + len(each.directions) for each in flown.values())
+    verdicts = []
+    for each in flown.values():
+        together = each.whitened.size
+        intervals = [ratio_interval(float(ratio), len(each.errors), simultaneous) for ratio in each.directions]
+        every = {_within(interval) for interval in (*intervals, ratio_interval(each.scale, together, simultaneous))}
+        inside = [_within(interval) is Verdict.PASS for interval in intervals]
+        right = [low <= 1.0 <= high for low, high in intervals]
+        alike = all(inside) or (all(np.logical_or(inside, right)) and each.p_value >= RISK / len(flown))
+        reached = alike and _within(ratio_interval(each.scale, together, 1.0 - RISK)) is Verdict.PASS
+        verdicts.append(Verdict.FAIL if Verdict.FAIL in every else Verdict.PASS if reached else Verdict.OPEN)
+    worst = max(flown, key=lambda name: abs(np.log(flown[name].scale)))
+    single = [float(ratio) for each in flown.values() for ratio in each.directions]
+    said = (
+        f"all directions together {flown[worst].scale:.3f} ± {scale_error(flown[worst]):.3f} at worst "
+        f"({TITLES[worst]}); single directions {min(single):.3f} to {max(single):.3f}, each ± "
+        f"{max(each.rms_error for each in flown.values()):.3f}; {_least_p(flown)}; "
+        f"{format_range([len(each.errors) for each in flown.values()], 6)} flights of each"
+    )
+    return Goal(text, said, Verdict.all_of(verdicts), Severity.HIGH)
+
+
+def _least_p(flown: Mapping[str, Realised]) -> str:
+    """Return the smallest p-value of a covariance, in words."""
+    known = {name: each.p_value for name, each in flown.items() if np.isfinite(each.p_value)}
+    if not known:
+        return "covariances not tested with so few flights"
+    name = min(known, key=lambda key: known[key])
+    return (
+        f"smallest p of a covariance {format_p_value(known[name])} ({TITLES[name]}; at least "
+        f"{format_number(RISK / len(flown), 2)} required)"
+    )
+
+
+def _within(interval: tuple[float, float]) -> Verdict:
+    return Verdict.between(*interval, least=1.0 - WITHIN, most=1.0 + WITHIN)
+
+
+def scale_error(realised: Realised) -> float:
+    """Return the standard error of `Realised.scale` where the prediction is right."""
+    return float(1.0 / np.sqrt(2.0 * realised.whitened.size))
 
 
 def _robots_goal(starts: str, result: Result) -> Goal:
@@ -108,7 +155,7 @@ def _robots_goal(starts: str, result: Result) -> Goal:
     text = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {starts}, per parameter"
     crowd = result.crowds.get("d-optimal")
     if crowd is None or result.searches is None or not result.rivals:
-        return Goal(text, "not run", Verdict.NOT_TESTED)
+        return Goal(text, "not run", Verdict.NOT_TESTED, Severity.MEDIUM)
     away = {"ETS-VII": float(np.expm1((result.searches.costs - crowd.cost) / PARAMETERS).mean())}
     away |= {
         name: float(np.expm1((rivals.search - rivals.crowd) / PARAMETERS)) for name, rivals in result.rivals.items()
@@ -116,7 +163,8 @@ def _robots_goal(starts: str, result: Result) -> Goal:
     told = [f"{format_percent(abs(x), 2)} {'worse' if x > 0.0 else 'better'} on {name}" for name, x in away.items()]
     reached = f"{', '.join(told)}; on ETS-VII the mean of {len(result.searches.costs)} searches"
     enough = len(crowd.costs) >= STARTS and len(away) >= ROBOTS
-    return Goal(text, reached, Verdict.of(max(away.values()) <= ALIKE) if enough else Verdict.OPEN)
+    verdict = Verdict.of(max(away.values()) <= ALIKE) if enough else Verdict.OPEN
+    return Goal(text, reached, verdict, Severity.MEDIUM)
 
 
 def _largest(contest: Contest) -> str:
@@ -132,8 +180,16 @@ def _best_known(result: Result, crowd: Crowd) -> float:
     return min(crowd.cost, result.contest.designs["d-optimal"].optimum.cost, *repeated)
 
 
-def _largest_goal(text: str, result: Result, crowd: Crowd) -> Goal:
+def _largest_goal(starts: str, result: Result) -> Goal:
     """Return whether several searches, each followed to its end, reach the best known: else more may be possible."""
+    text = (
+        f"Largest factor over (26) from {starts}; {SEVERAL} completed searches within {format_percent(ALIKE)} of the "
+        "best known"
+    )
+    crowd = result.crowds.get("d-optimal")
+    if crowd is None:
+        reached = f"{_largest(result.contest)} from {result.search.starts} starts; {starts} were not run"
+        return Goal(text, reached, Verdict.NOT_TESTED, Severity.MEDIUM)
     repeated = [] if result.searches is None else result.searches.costs.tolist()
     followed = np.array([crowd.cost, *repeated])
     within = int((np.expm1((followed - _best_known(result, crowd)) / PARAMETERS) <= ALIKE).sum())
@@ -142,23 +198,31 @@ def _largest_goal(text: str, result: Result, crowd: Crowd) -> Goal:
         f"{_largest(result.contest)} from {count} starts; {within} of {len(followed)} completed searches within "
         f"{format_percent(ALIKE)} of the best known"
     )
-    return Goal(text, reached, Verdict.PASS if within >= SEVERAL and count >= STARTS else Verdict.OPEN)
+    verdict = Verdict.PASS if within >= SEVERAL and count >= STARTS else Verdict.OPEN
+    return Goal(text, reached, verdict, Severity.MEDIUM)
 
 
-def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
-    """Return whether repeated searches end near the best that anything found."""
-    if result.searches is None:
-        return Goal(text, "no search was repeated", Verdict.NOT_TESTED)
+def near(result: Result) -> str:
+    """Return how near repeated searches end to the best that anything reached, in a sentence; empty without any."""
+    crowd = result.crowds.get("d-optimal")
+    if crowd is None or result.searches is None:
+        return ""
     costs = result.searches.costs
     best = _best_known(result, crowd)
     worse = np.expm1((costs - best) / PARAMETERS)
     usual = np.expm1((crowd.expected(USUAL) - best) / PARAMETERS)
     within = int((worse <= ALIKE).sum())
-    reached = (
-        f"{format_percent(worse.mean(), 2)} worse in the mean of {len(costs)} searches, {within} of them within "
-        f"{format_percent(ALIKE)}; {format_percent(usual, 2)} for first descents from {USUAL} starts"
+    return (
+        f"Thorough searches by d-optimality end {format_percent(worse.mean(), 2)} above the best known per parameter "
+        f"in the mean of {len(costs)}, {within} of them within {format_percent(ALIKE)}; first descents from {USUAL} "
+        f"starts, {format_percent(usual, 2)}."
     )
-    return Goal(text, reached, Verdict.of(worse.mean() <= ALIKE) if len(crowd.costs) >= STARTS else Verdict.OPEN)
+
+
+def _consistent(contest: Contest) -> str:
+    """Return whether every criterion ranks first the manoeuvre that was designed by it, in a sentence."""
+    right = "is the best of all by it" if contest.consistent else "is not always the best of all by it"
+    return f"For the {len(contest.designs)} criteria, the manoeuvre designed by a criterion {right}."
 
 
 def _report(result: Result) -> Report[Result]:
@@ -177,6 +241,11 @@ def _report(result: Result) -> Report[Result]:
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
         "gradient acts.",
         goals=goals(result),
+        note=f"Errors of parameters are correlated, so realised errors are judged along the principal axes of the "
+        "predicted correlations, in which they are independent. The goal is missed if one of all intervals with 95 % "
+        f"simultaneous confidence is outside 1 ± {format_percent(WITHIN)}. It is reached if for every manoeuvre the 95 "
+        "% interval of all directions together is inside, and neither a simultaneous interval of one direction nor a "
+        "likelihood-ratio test of a covariance (5 % family-wise) contradicts the prediction.",
         full=result.full,
         figure=Picture(
             _factor_figure(contest),
@@ -265,6 +334,7 @@ def _evidence(document: Document, result: Result) -> None:
         "printed over that of the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of "
         "the base's mass.",
     )
+    document.paragraph(" ".join(filter(None, [_consistent(contest), near(result)])))
     if result.crowds:
         document.figure(
             _crowd_figure(result),
@@ -291,16 +361,25 @@ def _calibration(document: Document, result: Result) -> None:
     rows = []
     for name, realised in result.realised.items():
         beyond = [LABELS[k] for k in range(10) if abs(realised.rms[k] - 1.0) > WITHIN]
-        step = format_number(float(realised.last_step.max()), 2)
         rows.append(
-            [TITLES[name], str(len(realised.errors)), format_percent(realised.rms_error, 2), ", ".join(beyond), step]
+            [
+                TITLES[name],
+                str(len(realised.errors)),
+                f"{realised.scale:.3f} ± {scale_error(realised):.3f}",
+                f"{realised.directions.min():.3f} to {realised.directions.max():.3f}",
+                format_p_value(realised.p_value) if np.isfinite(realised.p_value) else NO_VALUE,
+                format_percent(realised.rms_error, 2),
+                ", ".join(beyond),
+                format_number(float(realised.last_step.max()), 2),
+            ]
         )
     add_number_table(
         document,
-        ["manoeuvre", "flights", "error", "beyond", "last step [sd]"],
+        ["manoeuvre", "flights", "all directions", "each", "p", "error", "beyond", "last step [sd]"],
         [[cell or "none" for cell in row] for row in rows],
-        f"Flights in MuJoCo: parameters whose realised error is not within {format_percent(WITHIN)} of the predicted "
-        "sd. With the stated standard error of each ratio, some of ten are outside by chance alone. The modes were "
+        "Flights in MuJoCo: realised over predicted sd of ten independent directions together and of each, p-value of "
+        "their covariance, standard error of one ratio, and parameters whose realised error is not within "
+        f"{format_percent(WITHIN)} of the predicted sd; some of ten are outside by chance alone. The modes were "
         "computed by Gauss-Newton steps with the Jacobian of the plan; last step: largest change of a coordinate in "
         "the last step.",
     )
@@ -350,8 +429,12 @@ def _tables(result: Result) -> list[CsvTable]:
     ]
     designed = list(contest.designs.values())
     parameters = [[each.name, *map(float, each.parameters)] for each in designed]
-    realised = [[name, len(fits.errors), *map(float, fits.rms)] for name, fits in result.realised.items()]
+    realised = [
+        [name, len(fits.errors), *map(float, fits.rms), *map(float, fits.directions)]
+        for name, fits in result.realised.items()
+    ]
     ratios = [f"rms / predicted sd, {text}" for text in HEADINGS]
+    ratios += [f"rms / predicted sd, direction {number}" for number in range(1, PARAMETERS + 1)]
     return [
         CsvTable("predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
         CsvTable("manoeuvres", ["manoeuvre", *designed[0].problem.plan.family.names], parameters),

@@ -139,8 +139,8 @@ def _goals(result: Result) -> list[Goal]:
         f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} "
         "divided by their number) and mode, importance sampling and emcee agree",
         f"squared distances over drawn systems follow chi-square (Kolmogorov-Smirnov p at least {LEVEL:g}), and no "
-        f"more of them than chance allows are beyond its {format_percent(TAIL)} or below its {format_percent(1.0 - TAIL)} "
-        f"quantile (two-sided p at least {LEVEL:g})",
+        f"more of them than chance allows are beyond its {format_percent(TAIL)} or below its "
+        f"{format_percent(1.0 - TAIL)} quantile (two-sided p at least {LEVEL:g})",
     )
     if result.coverage is None:
         return [*goals, *(Goal(text, "not run", Verdict.NOT_TESTED, Severity.HIGH) for text in texts)]
