@@ -131,7 +131,7 @@ def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
     least = min(replicate.holm(p_values).values())
     verdict = Verdict.FAIL if least <= FAMILYWISE else Verdict.OPEN  # so few replicates show gross errors alone
     made = {runs.case: len(runs.bodies(Method.EMCEE)) for runs in cases if runs.case in ARMS}
-    counts = ", ".join(f"{count or 'none'} of {case.label}" for case, count in made.items())
+    counts = ", ".join(f"{count or 'none'} ({case.label})" for case, count in made.items())
     return Goal(text, f"{counts}; smallest corrected p {format_p_value(least)}", verdict, Severity.HIGH)
 
 
@@ -392,7 +392,7 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
             special = name == LOG_LIKELIHOOD
             colour, width, order = (COLOURS[1], 1.4, 3) if special else ("0.6", 0.5, 2)
             axes.plot(POINTS, share - POINTS, color=colour, linewidth=width, zorder=order)
-        axes.set_title(runs.case.label)
+        axes.set_title(runs.case.label.replace("uncertain by ", ""))
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[-1]:

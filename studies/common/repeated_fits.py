@@ -161,8 +161,8 @@ def ratio_interval(ratio: float, count: int, level: float) -> tuple[float, float
     count : int; number of errors
     level : float; probability that the interval contains the true ratio
     """
-    high, low = chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], count)
-    return ratio * float(np.sqrt(count / low)), ratio * float(np.sqrt(count / high))
+    few, many = (float(chi2.ppf(part, count)) for part in (0.5 * (1.0 - level), 0.5 * (1.0 + level)))
+    return ratio * float(np.sqrt(count / many)), ratio * float(np.sqrt(count / few))
 
 
 @dataclass(frozen=True)

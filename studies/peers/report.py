@@ -154,7 +154,10 @@ def _speed_goal(made: Made, sizes: Sequence[int]) -> Goal:
     """Return the goal on the times with some numbers of unknowns; the worst decides."""
     text = f"at least {FASTER:g} times faster than the best peer, {joined(map(str, sizes))} unknowns"
     parts = {unknowns: _speed(made, unknowns) for unknowns in sizes}
-    reached = "; ".join(f"{unknowns}: {said}" if len(sizes) > 1 else said for unknowns, (said, _) in parts.items())
+    several = len(sizes) > 1
+    reached = "; ".join(
+        f"{unknowns} unknowns: {said.replace('; ', ', ')}" if several else said for unknowns, (said, _) in parts.items()
+    )
     verdict = Verdict.all_of(part for _, part in parts.values())
     return Goal(text, "not run" if verdict is Verdict.NOT_TESTED else reached, verdict, Severity.LOW)
 
