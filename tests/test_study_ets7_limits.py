@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,9 @@ from bayesid._io.errors import InputError
 from bayesid.identifiability.local_knowledge import Knowledge
 from studies.common import mission
 from studies.common.ets7 import EXCURSION, RAMPS, START, FlightManoeuvre
-from studies.common.study import CsvTable
+from studies.common.study import CsvTable, Verdict
 from studies.ets7_limits.analysis import Answer, Repeated, designed_motion
-from studies.ets7_limits.report import time_needed
+from studies.ets7_limits.report import USUAL, goals, time_needed
 
 TRUTH = np.ones(10)
 
@@ -91,3 +93,13 @@ def test_the_manoeuvre_is_read_from_the_table_of_the_other_study(tmp_path):
     values = 0.01 * np.arange(len(names))
     CsvTable("manoeuvres", ["manoeuvre", *names], [["d-optimal", *values]]).write(tmp_path / "excitation.pdf")
     np.testing.assert_allclose(designed_motion(file).parameters, values)
+
+
+@pytest.mark.parametrize(("once", "verdict"), [(0.002, Verdict.PASS), (0.02, Verdict.FAIL)])
+def test_the_arm_is_exact_in_the_goal(once: float, verdict: Verdict):
+    def worst(known: bool) -> float:
+        return once if known else 0.5
+
+    answers = {USUAL: {(True, False): Answer(once, 1.0, 0.0, False)}}
+    (goal,) = goals(SimpleNamespace(after={"designed": SimpleNamespace(worst=worst)}, answers=answers))
+    assert goal.verdict is verdict

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,10 @@ from bayesid.inference.body_quantities import BodyDraws
 from studies.common import mission
 from studies.common.ets7 import TIP_SPEED
 from studies.common.flight import flown_along
+from studies.common.study import Verdict
 from studies.load import paper
 from studies.load.loops import SAFE, Flight, iterate, load_unknown, robot_with_load
+from studies.load.report import _goals
 
 
 def test_only_one_reading_of_the_printed_inertia_is_a_body():
@@ -65,3 +68,41 @@ def test_without_noise_the_load_is_found_from_a_guess_of_a_thirtieth():
     assert second.worst < 1e-6
     assert np.abs(paper.errors(paper.RESULTS[0])).max() > 1e2 * first.worst
     assert np.abs(first.parameters - second.parameters).max() > 0.0
+
+
+def test_each_goal_fails_with_one_of_its_parts():
+    def flight(**changed):
+        parts = {"error": 0.0005, "relative": 0.0005, "distance": 9.0, "used": 0.9} | changed
+        numbers = {key: np.full(10, parts[key]) for key in ("error", "relative")}
+        return SimpleNamespace(
+            status=changed.get("status", "reached"),
+            bodies=[None] * 5,
+            reviews=[{"trusted": True}, {"trusted": changed.get("trusted", True)}],
+            error=lambda step: numbers["error"],
+            relative=lambda step: numbers["relative"],
+            worst=lambda step: (0.001, 0.001),
+            distance=lambda step: parts["distance"],
+            used={"tip_speed": parts["used"]},
+        )
+
+    def verdicts(loop=None, exact=None, worst=1e-7):
+        flights = {"loop": flight(**(loop or {})), "exact": flight(**(exact or {}))}
+        result = SimpleNamespace(flights=flights, iterations=[SimpleNamespace(worst=worst)])
+        return [goal.verdict for goal in _goals(result)]
+
+    assert verdicts() == [Verdict.PASS] * 5
+    assert verdicts(loop={"error": 0.003, "relative": 0.003}) == [Verdict.PASS] * 5  # the arm's prior sets this floor
+    missed = [
+        (0, {"exact": {"error": -0.003}}),
+        (0, {"exact": {"relative": 0.003}}),
+        (1, {"loop": {"status": "no-go"}}),
+        (1, {"loop": {"trusted": False}}),
+        (2, {"loop": {"used": 1.1}}),
+        (2, {"exact": {"used": 1.1}}),
+        (3, {"loop": {"distance": 30.0}}),
+        (3, {"exact": {"distance": 30.0}}),
+        (4, {"worst": 1e-5}),
+    ]
+    for number, changed in missed:
+        found = verdicts(**changed)
+        assert [place for place, verdict in enumerate(found) if verdict is Verdict.FAIL] == [number], changed

@@ -87,7 +87,9 @@ def _report(cases: Cases) -> Report[Cases]:
         sections=[_negatives, _evidence],
         statements=_statements(cases),
         tables=[
-            CsvTable("quantities", ["base known to", *(field.name for field in fields(analysis.Amplitude))], quantities)
+            CsvTable(
+                "quantities", ["base uncertain by", *(field.name for field in fields(analysis.Amplitude))], quantities
+            )
         ],
     )
 
