@@ -61,7 +61,7 @@ def test_a_gyro_that_saturates_stays_within_its_limits_and_one_that_freezes_repe
         true = truth.rate[:, "xyz".index(name[-1])]
         frozen = change != 0.0
         assert np.ptp((true + change)[frozen]) < 1e-15
-        assert TIMES[frozen].max() - TIMES[frozen].min() < 4.0
+        assert TIMES[frozen].max() - TIMES[frozen].min() < 2.0
 
 
 def test_errors_of_gyro_and_accelerometer_follow_what_they_depend_on(truth):

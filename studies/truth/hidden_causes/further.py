@@ -93,8 +93,8 @@ def saturated_gyro(draw: Generator, strength: float) -> Options:
 
 
 def frozen_gyro(draw: Generator, strength: float) -> Options:
-    """Rate sensor that repeats its last reading for some seconds, once in each recording."""
-    start, length = float(draw.uniform(40.0, 90.0)), 4.0 * strength
+    """Rate sensor that repeats its last reading for a second or more, once in each recording."""
+    start, length = float(draw.uniform(40.0, 90.0)), 1.0 + strength
 
     def distort(table: Table, truth: Truth) -> None:
         frozen = (truth.times >= start) & (truth.times < start + length)
