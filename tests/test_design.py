@@ -26,13 +26,11 @@ from bayesid.design import (
     Plan,
     Problem,
     Search,
-    Separation,
     Tip,
     TrajectoryFamily,
     design,
 )
 from bayesid.design.flight import Flight, Outcome
-from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.trajectory import Trajectory
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
@@ -200,49 +198,6 @@ class Growing(Steady):
 
     def read(self, values, readings):
         return readings.replace(rate=readings.rate + readings.time[:, None] * jnp.array([0.0, 0.0, 1.0]) * values[0])
-
-
-def told_apart(own: Plan) -> np.ndarray:
-    """Lambda (1 - rho^2) of a steady and a growing fault, by hand."""
-    signals = np.stack([np.ones(len(own.samples)), own.samples]) * 1e-3 / own.sigma[2]
-    gram = signals @ signals.T
-    rho = gram[0, 1] / np.sqrt(gram[0, 0] * gram[1, 1])
-    return np.diag(gram) * (1.0 - rho**2)
-
-
-@pytest.mark.slow
-def test_separation_is_lambda_times_one_minus_rho_squared() -> None:
-    own = plan(effects=(Steady(), Growing()), unknown=False)
-    criterion = Separation(("steady", "growing"))
-    result = flown(own)
-    expected = told_apart(own)
-    np.testing.assert_allclose(criterion.noncentrality(own, result), expected, rtol=1e-6)
-    assert criterion.cost(own, result) == pytest.approx(-0.5 * np.log(expected.min()))
-    with pytest.raises(InputError, match="no effect 'slosh'"):
-        Separation(("steady", "slosh")).noncentrality(own, result)
-
-
-class Half(Steady):
-    """A steady fault with a second size that no reading shows."""
-
-    name = "half"
-    parameters = (*Steady.parameters, Parameter("unseen", "rad/s", 1e-3))
-
-
-@pytest.mark.slow
-def test_separation_seeks_the_worst_direction_among_those_that_manoeuvres_show() -> None:
-    own = plan(effects=(Half(), Growing()), unknown=False)
-    everywhere = Separation(("half", "growing"))
-    result = flown(own)
-    assert everywhere.noncentrality(own, result)[0] == pytest.approx(0.0, abs=1e-6)
-    rng = np.random.default_rng(1)
-    problem = adapted_to_family(Problem(own, Limits(joint_speed=0.5), (DOptimal(), everywhere)), rng)
-    other, seeing = problem.criteria
-    assert other == DOptimal()
-    np.testing.assert_allclose(np.abs(seeing.visible[0]), [[1.0, 0.0]], atol=1e-9)
-    assert seeing.unseen == {"half": 1}
-    np.testing.assert_allclose(seeing.noncentrality(own, result), told_apart(own), rtol=1e-6)
-    assert adapted_to_family(problem, rng) is problem
 
 
 @pytest.mark.slow

@@ -92,6 +92,6 @@ def test_a_criterion_that_is_unknown_or_made_wrongly_is_named_as_soon_as_a_model
 
 
 def test_every_criterion_says_what_it_rewards():
-    shipped = {name: kind for name, kind in known_criteria().items() if kind.__module__ == "bayesid.design.criteria"}
+    shipped = {name: kind for name, kind in known_criteria().items() if kind.__module__.startswith("bayesid.design.")}
     assert len(shipped) == 8
     assert len({kind.meaning for kind in shipped.values()} - {Criterion.meaning}) == 8

@@ -17,12 +17,13 @@ from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
 from bayesid.app.schema import DesignSection, Study
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise, named_joint
-from bayesid.app.study_to_model import criteria_of, load_model
+from bayesid.app.study_to_model import criteria_of, load_model, stated_bounds
 from bayesid.design import Design, Search, best_design, design
-from bayesid.design.criteria import DOptimal, Separation
+from bayesid.design.criteria import DOptimal
 from bayesid.design.design_problem import Problem
 from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
+from bayesid.design.separation import Separation
 from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily, extended_posture
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
 from bayesid.recording.sampled_curve import SampledCurve
@@ -68,6 +69,7 @@ def load_problem(study: Study | str | Path) -> Problem:
             step=_step(model, section, limits),
             thinning=math.ceil(section.duration / section.interval / SAMPLES),
             wheel_speeds=_wheel_speeds(model.robot, section),
+            bounds=stated_bounds(study),
         )
         _check_traceable(plan)
         return Problem(plan, limits, criteria_of(section))

@@ -15,13 +15,11 @@ from bayesid.design.criteria import (
     InformationGain,
     Paper26,
     Paper26Intended,
-    Separation,
-    expected_probability,
     known_criteria,
     named_criteria,
-    noncentrality_for,
     register_criterion,
 )
+from bayesid.design.decision_rate import DecisionRate
 from bayesid.design.design_problem import Problem
 from bayesid.design.design_result import Design, best_design, design, evaluate
 from bayesid.design.excitation_loop import Loop, NotFlown
@@ -30,6 +28,7 @@ from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, Relati
 from bayesid.design.motion_limits import Limit, Limits
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
+from bayesid.design.separation import Separation
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
 from bayesid.design.trajectory_search import THOROUGH, Search, SearchResult, Store, optimise
@@ -43,6 +42,7 @@ __all__ = [
     "ConditionNumber",
     "Criterion",
     "DOptimal",
+    "DecisionRate",
     "Design",
     "EOptimal",
     "Fourier",
@@ -76,10 +76,8 @@ __all__ = [
     "best_design",
     "design",
     "evaluate",
-    "expected_probability",
     "known_criteria",
     "named_criteria",
-    "noncentrality_for",
     "optimise",
     "planned_manoeuvre",
     "planned_posterior",

@@ -9,18 +9,17 @@ it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any, ClassVar, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.optimize import brentq
-from scipy.special import expit
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.design.decision_rate import DecisionRate
 from bayesid.design.flight import Outcome
 from bayesid.design.plan import Plan
 
@@ -33,12 +32,10 @@ __all__ = [
     "InformationGain",
     "Paper26",
     "Paper26Intended",
-    "Separation",
     "covariance",
-    "expected_probability",
     "known_criteria",
     "named_criteria",
-    "noncentrality_for",
+    "prior_of",
     "register_criterion",
 ]
 
@@ -70,6 +67,8 @@ class Criterion:
         Whether the criterion takes ``rivals``, the effects to distinguish that a study names under ``design.rivals``.
     rivals : tuple of str
         Labels of the effects that the criterion distinguishes.
+    starts_from : tuple of str
+        Names of criteria whose best manoeuvres are among the starts of a search by this one.
     """
 
     name: ClassVar[str] = ""
@@ -77,6 +76,7 @@ class Criterion:
     informed: ClassVar[bool] = True
     usual: ClassVar[bool] = False
     compares_rivals: ClassVar[bool] = False
+    starts_from: ClassVar[tuple[str, ...]] = ()
     draws: int = field(default=0, kw_only=True)
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
@@ -97,28 +97,27 @@ class Criterion:
         return ()
 
     @property
-    def unseen(self) -> Mapping[str, int]:
-        """Number of directions of a rival's amplitudes that are omitted since no manoeuvre excites them, by label."""
-        return {}
-
-    @property
     def adaptable(self) -> bool:
         """Whether the criterion is still to be adapted to what the manoeuvres of a family can show."""
         return False
 
     def shown(self, plan: Plan, outcome: Outcome) -> list[Array]:
-        """Return what a manoeuvre shows, arrays whose sums over some manoeuvres `adapted` takes.
+        """Return what a manoeuvre shows, arrays whose sums over some manoeuvres `adapted` takes; by default nothing.
 
         Parameters
         ----------
         plan, outcome
             As of `cost`.
         """
-        raise NotImplementedError
+        return []
 
-    def adapted(self, shown: Sequence[Floats]) -> Criterion:
-        """Return the criterion adapted to what some manoeuvres of a family show."""
-        raise NotImplementedError
+    def adapted(self, plan: Plan, shown: Sequence[Floats], rng: np.random.Generator) -> Criterion:
+        """Return the criterion adapted to what some manoeuvres of a family show, by default itself."""
+        return self
+
+    def expected(self, plan: Plan, shown: Sequence[Floats], rng: np.random.Generator) -> dict[str, DecisionRate]:
+        """Return the expected rate of decisions for each rival from what a manoeuvre shows, by default none."""
+        return {}
 
 
 def register_criterion(criterion: C) -> C:
@@ -186,10 +185,11 @@ def covariance(plan: Plan, outcome: Outcome) -> Array:
     outcome : Outcome
         Outcome with information and prior of all unknowns, (n, n) each.
     """
-    return _of_bodies(plan, outcome.information + _prior(plan, outcome))
+    return _of_bodies(plan, outcome.information + prior_of(plan, outcome))
 
 
-def _prior(plan: Plan, outcome: Outcome) -> Array:
+def prior_of(plan: Plan, outcome: Outcome) -> Array:
+    """Return the precision of the unknowns' coordinates before the manoeuvre, shape (n, n)."""
     return jnp.eye(plan.unknowns.size) if outcome.prior is None else outcome.prior
 
 
@@ -341,131 +341,5 @@ class InformationGain(Criterion):
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""
-        prior = jnp.linalg.slogdet(_of_bodies(plan, _prior(plan, outcome)))[1]
+        prior = jnp.linalg.slogdet(_of_bodies(plan, prior_of(plan, outcome)))[1]
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
-
-
-@register_criterion
-@dataclass(frozen=True)
-class Separation(Criterion):
-    """Smallest signal-to-noise ratio of any of several rival effects, with all other unknowns marginalised.
-
-    The other unknowns include the remaining rivals. Half the squared ratio is the expected log Bayes factor of the
-    rival against all others if it acts in the least visible direction of its amplitudes, with the size of its prior.
-    For two effects of one parameter the squared ratio is lambda (1 - rho^2) of the weaker one. The model of the plan
-    must contain the rivals.
-
-    A direction that all other unknowns imitate in every manoeuvre, such as a constant force together with the bias of
-    an accelerometer, would be the worst direction of every manoeuvre and hide how these differ in the others. `adapted`
-    omits such directions.
-
-    Parameters
-    ----------
-    rivals : tuple of str
-        Labels of the effects to distinguish, at least two.
-    visible : tuple of tuple of tuple of float, optional
-        Orthonormal directions (k, n) of each rival's n amplitudes among which the worst is sought, by default all.
-    """
-
-    name = "separation"
-    meaning = (
-        "The largest expected log Bayes factor between the rival effects, each in the least visible direction of its "
-        "amplitudes, with all other quantities unknown. Directions that no manoeuvre can excite are omitted."
-    )
-    compares_rivals = True
-    LEAST: ClassVar[float] = 1.0
-    """Noncentrality that all of some manoeuvres must reach in a direction: half a nat of expected log Bayes factor."""
-
-    rivals: tuple[str, ...] = ()
-    visible: tuple[tuple[tuple[float, ...], ...], ...] | None = None
-
-    def __post_init__(self) -> None:
-        if len(self.rivals) < 2:
-            raise InputError(
-                f"{len(self.rivals)} effects to distinguish", place="design.rivals", remedy="Name at least two"
-            )
-
-    @property
-    def unseen(self) -> Mapping[str, int]:
-        """Number of directions of its amplitudes in which no manoeuvre shows a rival, by its label, where any."""
-        pairs = zip(self.rivals, self.visible or (), strict=False)
-        counts = {label: len(directions[0]) - len(directions) for label, directions in pairs}
-        return {label: count for label, count in counts.items() if count}
-
-    @property
-    def adaptable(self) -> bool:
-        """Whether the worst direction is still sought among all."""
-        return self.visible is None
-
-    def adapted(self, shown: Sequence[Floats]) -> Separation:
-        """Return the criterion restricted to directions in which the rivals are shown; the best shown always is one.
-
-        Parameters
-        ----------
-        shown : sequence of (n, n) arrays
-            Sum of the quadratic forms `shown` over some manoeuvres, for each rival.
-        """
-        visible = []
-        for matrix in shown:
-            values, directions = np.linalg.eigh(matrix)
-            kept = directions.T[values >= min(self.LEAST, values[-1])]
-            visible.append(tuple(tuple(map(float, direction)) for direction in kept))
-        return replace(self, visible=tuple(visible))
-
-    def shown(self, plan: Plan, outcome: Outcome) -> list[Array]:
-        """Return for each rival the quadratic form of its amplitudes that is lambda (1 - rho^2), shape (n, n).
-
-        Amplitudes are in standard deviations of their prior.
-        """
-        groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
-        # no prior on the rivals' amplitudes, because a rival may have any size
-        free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
-        total = outcome.information + _prior(plan, outcome) * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
-        forms = []
-        for group in groups:
-            rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))
-            direct = outcome.information[jnp.ix_(group, group)]
-            cross = outcome.information[jnp.ix_(group, rest)]
-            forms.append(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T)
-        return forms
-
-    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,).
-
-        Parameters
-        ----------
-        plan, outcome
-            As of `cost`.
-        """
-        forms = self.shown(plan, outcome)
-        if self.visible is not None:
-            bases = [jnp.asarray(directions) for directions in self.visible]
-            forms = [basis @ form @ basis.T for basis, form in zip(bases, forms, strict=True)]
-        return jnp.stack([jnp.linalg.eigvalsh(form)[0] for form in forms])
-
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return minus the logarithm of the smallest square root of a noncentrality."""
-        return -0.5 * jnp.log(jnp.maximum(jnp.min(self.noncentrality(plan, outcome)), 1e-12))
-
-    def _coordinates(self, plan: Plan, label: str) -> list[int]:
-        coordinates = list(plan.effect(label))
-        if not coordinates:
-            problem = f"the plan's model has no effect {label!r} with parameters"
-            raise InputError(problem, place="design.rivals", remedy="Extend the model by the rivals")
-        return coordinates
-
-
-def expected_probability(noncentrality: float) -> float:
-    """Return the mean posterior probability of the true one of two rivals that were equally probable before.
-
-    The log Bayes factor of two rivals of known size is normal with mean ``lambda / 2`` and variance ``lambda``, where
-    ``lambda`` is the noncentrality that remains for the true one after the other has absorbed its share.
-    """
-    points, weights = np.polynomial.hermite_e.hermegauss(61)  # so many nodes are good to 1e-6
-    factors = 0.5 * noncentrality + np.sqrt(noncentrality) * points
-    return float(weights @ expit(factors) / weights.sum())
-
-
-def noncentrality_for(probability: float) -> float:
-    """Return the noncentrality at which the true one is expected to have a probability between 0.5 and 1."""
-    return float(brentq(lambda value: expected_probability(value) - probability, 0.0, 200.0))

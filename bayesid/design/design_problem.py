@@ -33,7 +33,7 @@ FINER = 8
 """Ratio of the optimiser's time step to the one at which the limits of a result are checked."""
 
 # names of the compiled functions that depend neither on bounds nor on prior knowledge, both of which are arguments
-_SHARED = ("_informed_cost", "_motion_cost", "_fractions", "_fine_trajectory")
+_SHARED = ("_informed_cost", "_motion_cost", "_fractions", "_fine_trajectory", "_information")
 
 
 @dataclass(frozen=True)
@@ -270,6 +270,23 @@ class Problem:
             for criterion in self.criteria
         }
 
+    @in_double_precision
+    def shown(self, parameters: Floats) -> dict[str, list[Floats]]:
+        """Return what a manoeuvre shows at the prior's centre, by the name of the criterion that asks for it.
+
+        Parameters
+        ----------
+        parameters : (n,) array
+            Motion in its family.
+        """
+        information = self._information(parameters, self.centre, self.explained)
+        flight = Flight(self.plan, jnp.asarray(parameters), jnp.asarray(self.centre))
+        outcome = Outcome(flight, information, jnp.asarray(self.precision))
+        return {
+            criterion.name: [np.asarray(part) for part in criterion.shown(self.plan, outcome)]
+            for criterion in self.criteria
+        }
+
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return the used fractions of all limits, shape (m,), and their Jacobian, shape (m, n).
 
@@ -370,6 +387,11 @@ class Problem:
 
         branches = [branch(criterion) for criterion in self.criteria if criterion.informed is informed]
         return jax.lax.switch(index, branches, information)
+
+    @cached_property
+    def _information(self) -> QuickJit:
+        """Information about all unknowns, compiled."""
+        return QuickJit(lambda parameters, z, explained: Flight(self.plan, parameters, z).information(explained))
 
     @cached_property
     def _fractions(self) -> QuickJit:

@@ -15,7 +15,8 @@ from threadpoolctl import threadpool_limits
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
-from bayesid.design.criteria import Criterion
+from bayesid.design.criteria import Criterion, known_criteria
+from bayesid.design.decision_rate import DecisionRate
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_starts import adapted_to_family
@@ -25,7 +26,7 @@ from bayesid.design.trajectory_search import Search, SearchResult, Store, optimi
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
-__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "risks", "sample_times"]
+__all__ = ["Design", "Risk", "best_design", "decisions", "design", "evaluate", "risks", "sample_times"]
 
 CERTAIN = 0.99  # probability with which a limit must hold for a manoeuvre to be flown
 PASSES = 4  # largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them
@@ -64,6 +65,8 @@ class Design:
     predicted: Predicted  #: predicted posterior of the bodies to identify
     reached: Sequence[Reached]  #: largest values of all limited quantities
     risks: Sequence[Risk]  #: risks of the limits that depend on the inertial parameters
+    #: expected rates of decisions between the rivals that the criterion distinguishes, by label
+    decisions: Mapping[str, DecisionRate]
 
     @property
     def designed_by(self) -> Criterion | None:
@@ -117,6 +120,11 @@ class Design:
                 for risk in self.risks
             },
             "criteria": dict(self.costs),
+            **(
+                {"decisions": {label: rate._asdict() for label, rate in self.decisions.items()}}
+                if self.decisions
+                else {}
+            ),
             "search": {"costs_of_starts": list(self.optimum.costs), "evaluations": self.optimum.evaluations},
             "file": f"{self.name}.csv",
         }
@@ -166,7 +174,8 @@ def design(
 
     Each criterion is minimised from many starts, and again from any other manoeuvre that is better by it, until the
     manoeuvre designed by each criterion is the best by it. Criteria are adapted to what the family's manoeuvres can
-    show.
+    show. The best manoeuvres by the criteria from which another starts (`Criterion.starts_from`) are sought in any
+    case, and returned if the problem has these criteria.
 
     Parameters
     ----------
@@ -191,6 +200,7 @@ def design(
         If no manoeuvre satisfies the limits.
     """
     store = Store.forgetful() if store is None else store
+    asked, problem = len(problem.criteria), with_starts(problem)
     count = len(problem.criteria)
     *seeds, last, visible = np.random.SeedSequence(seed).spawn(2 * count + 2)
     problem = adapted_to_family(problem.with_encoder(encoder), np.random.default_rng(visible))
@@ -200,15 +210,20 @@ def design(
     }
     shares = _Shares(part_of(progress, 0.0, SEARCHING), count)
 
+    optima: dict[int, SearchResult] = {}
+
     def search_by(index: int) -> SearchResult:
         criterion = problem.criteria[index]
+        earlier = [
+            optima[place].parameters for place in optima if problem.criteria[place].name in criterion.starts_from
+        ]
         kept = store.of(f"{problem.plan.family.name}.{criterion.name}")
         return optimise(
             problem,
             criterion,
             np.random.default_rng(seeds[index]),
             search,
-            first=first,
+            first=[*first, *earlier],
             points=points[criterion.name],
             known=kept.known,
             keep=kept.keep,
@@ -216,16 +231,29 @@ def design(
         )
 
     problem.compile()
-    optima = _each(search_by, count, search.executor)
-    optima = _consistent(problem, points, optima, search, store, part_of(progress, SEARCHING, EVALUATING))
+    for later in (False, True):
+        places = [place for place, criterion in enumerate(problem.criteria) if bool(criterion.starts_from) is later]
+        if places:
+            results = _each(search_by, places, search.executor)
+            optima |= dict(zip(places, results, strict=True))
+    ends = [optima[place] for place in range(count)]
+    ends = _consistent(problem, points, ends, search, store, part_of(progress, SEARCHING, EVALUATING))
     streams = last.spawn(count)
 
     def evaluate_by(index: int) -> Design:
         name, rng = problem.criteria[index].name, np.random.default_rng(streams[index])
-        return evaluate(problem, name, optima[index], encoder, rng, points=points)
+        return evaluate(problem, name, ends[index], encoder, rng, points=points)
 
     progress(EVALUATING, "predicting the result of each manoeuvre")
-    return _each(evaluate_by, count, search.executor)
+    return _each(evaluate_by, range(asked), search.executor)
+
+
+def with_starts(problem: Problem) -> Problem:
+    """Return the problem with the criteria that others start from, after its own."""
+    names = [criterion.name for criterion in problem.criteria]
+    needed = dict.fromkeys(name for criterion in problem.criteria for name in criterion.starts_from)
+    missing = [known_criteria()[name]() for name in needed if name not in names]
+    return problem.judged_by([*problem.criteria, *missing]) if missing else problem
 
 
 def evaluate(
@@ -250,7 +278,7 @@ def evaluate(
     encoder : Encoder
         Noise of the encoders.
     rng : numpy.random.Generator
-        Source of the draws for the risks.
+        Source of the draws for the risks and the rates of decisions.
     points : mapping of str to list of (n,) arrays
         Points of the unknowns over which each criterion is averaged, by its name; by default the prior's centre.
     """
@@ -279,7 +307,25 @@ def evaluate(
         predicted=predict(posterior),
         reached=problem.reached(parameters),
         risks=risks(problem, parameters, rng),
+        decisions=decisions(problem, parameters, rng),
     )
+
+
+def decisions(problem: Problem, parameters: Floats, rng: np.random.Generator) -> dict[str, DecisionRate]:
+    """Return the expected rates of decisions between the rivals of a problem's criteria, by label.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem whose criteria are adapted to its family.
+    parameters : (n,) array
+        Motion in its family.
+    rng : numpy.random.Generator
+    """
+    comparing = [criterion for criterion in problem.criteria if criterion.rivals]
+    shown = problem.shown(parameters) if comparing else {}
+    parts = [criterion.expected(problem.plan, shown[criterion.name], rng) for criterion in comparing]
+    return {label: rate for part in parts for label, rate in part.items()}
 
 
 def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws: int = DRAWS) -> list[Risk]:
@@ -347,16 +393,16 @@ def _consistent(
 T = TypeVar("T")  # type of the result of one search
 
 
-def _each(function: Callable[[int], T], count: int, executor: Executor | None) -> list[T]:
-    """Return a function's values at 0 to ``count`` - 1, computed in threads if there is an executor.
+def _each(function: Callable[[int], T], places: Sequence[int], executor: Executor | None) -> list[T]:
+    """Return a function's values at some places, computed in threads if there is an executor.
 
     If one fails or the user interrupts, the executor is shut down, so that the others end as well.
     """
     if executor is None:
-        return [function(index) for index in range(count)]
-    with ThreadPoolExecutor(count) as threads:
+        return [function(place) for place in places]
+    with ThreadPoolExecutor(len(places)) as threads:
         try:
-            return list(threads.map(function, range(count)))
+            return list(threads.map(function, places))
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
             raise

@@ -15,6 +15,7 @@ from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.sampled_curve import SampledCurve
 from bayesid.recording.wheel_motion import WheelMotion
 from bayesid.robot.kinematics import Tip
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
@@ -49,6 +50,8 @@ class Plan:
         Standard deviation of the position samples of each joint [rad or m]; zero or none for exact joints.
     wheel_speeds : mapping of str to SampledCurve
         Planned speeds (n, 1) of the wheels [rad/s]; omitted wheels are at rest.
+    bounds : mapping of str to sequence of PhysicalBound
+        Largest sizes of effects that the user states, by label; others follow from the effect and the robot.
     """
 
     model: Model
@@ -62,6 +65,7 @@ class Plan:
     thinning: int = 1
     encoder_sigma: tuple[float, ...] = ()
     wheel_speeds: Mapping[str, SampledCurve] = field(default_factory=dict)
+    bounds: Mapping[str, Sequence[PhysicalBound]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what the plan is made of, without anything derived."""

@@ -7,14 +7,11 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax import Array
 from scipy.linalg import eigh
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.kept_jit import QuickJit
 from bayesid.design.design_problem import Problem
-from bayesid.design.flight import Flight, Outcome
 from bayesid.design.trajectories import PaperExcitation, TrajectoryFamily
 from bayesid.robot.composite_tables import ENTRIES, composite_rows
 from bayesid.robot.joint_state import JointState
@@ -159,20 +156,12 @@ def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
     rng : numpy.random.Generator
         Source of the random manoeuvres that are taken for the family.
     """
-    adaptable = [criterion for criterion in problem.criteria if criterion.adaptable]
-    if not adaptable:
+    if not any(criterion.adaptable for criterion in problem.criteria):
         return problem
-
-    def shown(parameters: Array, z: Array, prior: Array, explained: Array) -> list[list[Array]]:
-        flight = Flight(problem.plan, parameters, z)
-        outcome = Outcome(flight, flight.information(explained), prior)
-        return [criterion.shown(problem.plan, outcome) for criterion in adaptable]
-
-    compiled = QuickJit(shown)
     starts = [random_start(problem, rng) for _ in range(MANOEUVRES)]
-    each = [compiled(start, problem.centre, problem.precision, problem.explained) for start in starts]
-    sums = iter(jax.tree.map(lambda *parts: np.sum(parts, axis=0), *each))
-    return problem.judged_by([one.adapted(next(sums)) if one.adaptable else one for one in problem.criteria])
+    sums = jax.tree.map(lambda *parts: np.sum(parts, axis=0), *map(problem.shown, starts))
+    criteria = [one.adapted(problem.plan, sums[one.name], rng) if one.adaptable else one for one in problem.criteria]
+    return problem.judged_by(criteria)
 
 
 UNLIMITED = np.pi  # half of the range of a joint that has no limits [rad or m], and its largest speed [rad/s or m/s]

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.words import counted, joined, ordinal
-from bayesid.design import Criterion, Design, expected_probability, noncentrality_for
+from bayesid.design import Criterion, Design
+from bayesid.design.decision_rate import DECISION
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows
@@ -29,7 +30,6 @@ PAIRS = (
 )
 """Pairs of a body's quantities whose ellipses are drawn."""
 
-SURE = 0.95  # probability of the right one of two rivals at which they count as told apart
 REFERENCE = "paper-26"  # name of the design that the others are compared with
 
 
@@ -181,20 +181,20 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
 
 
 def separation_sentence(design: Design) -> str:
-    """Return how well a manoeuvre that was designed to tell effects apart does so, and down to which size."""
+    """Return how often a manoeuvre that was designed to distinguish effects is expected to do so."""
     criterion = design.designed_by
     if criterion is None or not criterion.rivals:
         raise ValueError(f"{design.name} was not designed to separate effects")
-    noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
-    share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
-    unseen = [f"{count} of {label}" for label, count in criterion.unseen.items()]
-    rest = f" Directions of the amplitudes that no manoeuvre reveals are omitted: {joined(unseen)}." if unseen else ""
+    rates = [
+        f"{format_percent(rate.rate, 3)} of its readings (standard error {format_percent(rate.standard_error, 1)}) if "
+        f"{label} is at work"
+        for label, rate in design.decisions.items()
+    ]
     return (
-        f"{design.name} distinguishes {joined(criterion.rivals)}: at the size of its prior, the least distinct effect "
-        f"has a signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of "
-        f"two causes that are equally probable beforehand, the correct one is expected to reach a probability of "
-        f"{format_number(SURE)} if its size is {format_percent(share, 2)} of its prior's, and "
-        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if its size is half of that.{rest}"
+        f"{design.name} distinguishes {joined(criterion.rivals)}: a probability of {format_number(DECISION)} or more "
+        f"for the correct one, both equally probable beforehand, is expected from {joined(rates)}. Sizes and "
+        "directions follow the prior of a diagnosis: sizes are evenly distributed in the logarithm, from those that no "
+        "manoeuvre resolves to the largest plausible ones."
     )
 
 

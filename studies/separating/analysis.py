@@ -1,42 +1,32 @@
-"""The rivals, the manoeuvres designed to tell them apart, and Bayes factors between them, expected and realised."""
+"""The manoeuvres designed to distinguish two causes, and their rates of decisions, predicted and realised."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
 
-from bayesid import Effect, Manoeuvre, Model
+from bayesid import Manoeuvre, Model
 from bayesid._math.arrays import Floats
-from bayesid.design import THOROUGH, DOptimal, Problem, Search, Separation, Store, optimise
+from bayesid._math.double_precision import in_double_precision
+from bayesid.design import THOROUGH, DecisionRate, DOptimal, Problem, Search, Separation, Store, optimise
+from bayesid.design.decision_rate import DECISION, Draws, decided_margins, log_evidence
 from bayesid.design.design_problem import Known
+from bayesid.design.design_result import decisions
+from bayesid.design.rival_prior import effect_of
 from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.joint_motion import Motion
-from bayesid.simulation.effects import ThrusterLeak, WheelMomentum
 from studies.common import mission
 from studies.common.ets7 import BIAS
-from studies.common.flight import light_wheel
 from studies.common.models import ARM_SPREAD
 from studies.common.monte_carlo import run_trials
 from studies.common.repeated_fits import Reference
-from studies.truth.mujoco import Truth, leak
-
-# the two causes with the widths of their priors; the leak is a small one, of half a millinewton
-CANDIDATES: tuple[Effect, ...] = (WheelMomentum(1.0), ThrusterLeak(5e-4, 5e-4))
-
-# momentum left in the wheels [N m s] and torque of the leak [N m], base axes, of which one is hidden
-TRUTHS: dict[str, Floats] = {
-    "wheel-momentum": np.array([-0.6, 0.35, 0.7]),
-    "thruster-leak": np.array([-3e-4, 1.8e-4, 3.6e-4]),
-}
-
-RIVALS = tuple(TRUTHS)  # labels of the two rivals
+from studies.separating.pairs import PAIRS, Cause, Pair
 
 # stages of the study, with the manoeuvres that are fitted together in each
 STAGES = {
@@ -45,28 +35,26 @@ STAGES = {
     "first, separating": ("first", "separation"),
 }
 
+LAST = "first, separating"  # stage with the separating manoeuvre
+
+DIRECTIONS = ("stated", "random")  # direction of a hidden cause, whose size is the stated one in either case
+
 SPREAD = 0.1  # relative width of the prior of the base
 
 # rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit
 DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
 
+NEEDED = float(np.log(DECISION / (1.0 - DECISION)))  # log Bayes factor at a decision between two causes
 
-def rival_of(label: str) -> str:
-    """Return the label of the other rival."""
-    return next(other for other in RIVALS if other != label)
+PREDICTED = 20_000  # number of draws behind a predicted rate
 
 
-def rival_model(labels: Sequence[str], arm_spread: float = ARM_SPREAD) -> Model:
-    """Return the mission's model with some of the candidates, given by their labels."""
+def rival_model(pair: Pair, arm_spread: float = ARM_SPREAD) -> Model:
+    """Return the mission's model with both causes."""
     model = mission.base_unknown(arm_spread, base_spread=SPREAD)
-    return replace(model, effects=(*model.effects, *(effect for effect in CANDIDATES if effect.label in labels)))
-
-
-def amplitude(label: str) -> Floats:
-    """Return the hidden amplitude of a rival in standard deviations of its prior; a leak has no force."""
-    effect = next(effect for effect in CANDIDATES if effect.label == label)
-    sigma = np.array([parameter.sigma for parameter in effect.parameters])
-    return np.pad(TRUTHS[label], (len(sigma) - 3, 0)) / sigma
+    for cause in pair.causes:
+        model = model.extend(cause.effect)
+    return model
 
 
 def drifting(unknowns: Unknowns) -> Floats:
@@ -77,95 +65,8 @@ def drifting(unknowns: Unknowns) -> Floats:
 
 
 @dataclass(frozen=True)
-class Designed:
-    """A designed manoeuvre."""
-
-    costs: dict[str, float]  # values of both criteria by name
-    largest: dict[str, float]  # largest values of the limited quantities by name
-    motion: ParameterisedMotion  # motion of the joints
-    # number of directions in which no manoeuvre shows a rival and which the criterion leaves out, by its label
-    left_out: dict[str, int]
-
-
-def separating_problem(points: int = mission.POINTS) -> Problem:
-    """Return the problem: six joints on B-splines within the flight's rule, separation and volume as criteria.
-
-    Manoeuvres start at the rate that the first manoeuvre has shown.
-    """
-    problem = mission.problem(rival_model(RIVALS), mission.splines(points), DOptimal(), Separation(RIVALS))
-    unknowns = problem.plan.unknowns
-    return problem.knowing(Known(drifting(unknowns), np.eye(unknowns.size)))
-
-
-def design_both(
-    problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
-) -> dict[str, Designed]:
-    """Design by both criteria from the same random starts, the second also from the first's best."""
-    problem = adapted_to_family(problem, np.random.default_rng(seed))
-    optima: list[np.ndarray] = []
-    for criterion in problem.criteria:
-        kept = store.of(criterion.name)
-        best = optimise(
-            problem,
-            criterion,
-            np.random.default_rng(seed),
-            search,
-            first=optima,
-            known=kept.known,
-            keep=kept.keep,
-            progress=lambda _, text: progress(text),
-        )
-        optima.append(best.parameters)
-    return {
-        criterion.name: Designed(
-            costs=problem.costs(best),
-            largest={limit.name: limit.largest for limit in problem.reached(best)},
-            motion=problem.plan.family.motion(best),
-            left_out=dict(criterion.unseen),
-        )
-        for criterion, best in zip(problem.criteria, optima, strict=True)
-    }
-
-
-@dataclass(frozen=True)
-class Expected:
-    """Expectations for one truth and a set of manoeuvres."""
-
-    alone: float  # noncentrality lambda of the effect against a model without it, everything else marginalised
-    apart: float  # noncentrality lambda (1 - rho^2) against a model with the rival in its place
-    log_factor: float  # mean log Bayes factor of the truth against the rival, what each prior costs included
-
-    @property
-    def sd(self) -> float:
-        """Standard deviation of the log Bayes factor, from noise alone."""
-        return float(np.sqrt(self.apart))
-
-    def exceeding(self, limit: float) -> float:
-        """Return the share of flights whose log Bayes factor exceeds a limit, taken as normal about its mean."""
-        return float(stats.norm.sf(limit, self.log_factor, self.sd)) if self.sd else float(self.log_factor > limit)
-
-    @property
-    def energy(self) -> float:
-        """Half of `apart`."""
-        return 0.5 * self.apart
-
-
-def unexplained_information(information: Floats, group: Sequence[int], rest: Sequence[int]) -> Floats:
-    """Return the information about a group of unknowns that the rest cannot imitate, shape (group, group).
-
-    Parameters
-    ----------
-    information : (n, n) array; information about all unknowns, without their prior
-    group, rest : sequences of int; unknowns of interest, and those to be marginalised with a standard normal prior
-    """
-    inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
-    cross = information[np.ix_(rest, group)]
-    return np.asarray(information[np.ix_(group, group)] - cross.T @ np.linalg.solve(inner, cross))
-
-
-@dataclass(frozen=True)
 class Linearised:
-    """Manoeuvres linearised about the drifting base, in the unknowns of a model with both rivals."""
+    """Manoeuvres linearised about the drifting base, in the unknowns of a model with both causes."""
 
     information: Floats  # (n, n): information in coordinates whose prior is standard normal, without that prior
     names: tuple[str, ...]  # names of the unknowns
@@ -193,61 +94,161 @@ class Linearised:
         score[place] += other.score
         return Linearised(total, (*self.names, *(f"second {other.names[index]}" for index in fresh)), score)
 
-    def group(self, label: str) -> list[int]:
-        """Return the indices of an effect's unknowns."""
-        return [index for index, name in enumerate(self.names) if name.startswith(f"{label}.")]
+    def left(self, change: Floats, amplitudes: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return information (K, K) and score (K,) that all other unknowns leave to the amplitudes of the causes.
 
-    def without(self, labels: Sequence[str]) -> list[int]:
-        """Return the indices of all unknowns but those of some effects."""
-        gone = {index for label in labels for index in self.group(label)}
-        return [index for index in range(len(self.names)) if index not in gone]
-
-    def expect(self, truth: str, amplitude: Floats) -> Expected:
-        """Return the expectations where one of the rivals acts with an amplitude, in prior standard deviations."""
-        hidden, rival = self.group(truth), self.group(rival_of(truth))
-        rest = self.without([truth, rival_of(truth)])
-        signal = self.information[:, hidden] @ amplitude
-        mean = [self._expected_evidence([*rest, *rows], signal) for rows in (hidden, rival)]
-        alone, apart = (
-            float(amplitude @ unexplained_information(self.information, hidden, known) @ amplitude)
-            for known in (rest, [*rest, *rival])
-        )
-        return Expected(alone, apart, mean[0] - mean[1])
-
-    def log_evidence(self, rows: Sequence[int]) -> float:
-        """Return the log evidence of the model with some unknowns given what was recorded, up to a common constant."""
-        total, score = self.information[np.ix_(rows, rows)] + np.eye(len(rows)), self.score[list(rows)]
-        return float(0.5 * score @ np.linalg.solve(total, score) - 0.5 * np.linalg.slogdet(total)[1])
-
-    def _expected_evidence(self, rows: list[int], signal: Floats) -> float:
-        """Return the mean log evidence of the model with some unknowns, up to what all models share."""
-        within = self.information[np.ix_(rows, rows)]
-        total = within + np.eye(len(rows))
-        fitted = signal[rows] @ np.linalg.solve(total, signal[rows]) + np.trace(np.linalg.solve(total, within))
-        return float(0.5 * fitted - 0.5 * np.linalg.slogdet(total)[1])
+        Parameters
+        ----------
+        change : (m, m) array; derivatives of the first m coordinates by amplitudes and other coordinates
+        amplitudes : (K,) sequence of int; places of the amplitudes
+        """
+        whole = np.eye(len(self.names))
+        whole[: len(change), : len(change)] = change
+        total = whole.T @ (self.information + np.eye(len(whole))) @ whole
+        order = [*np.setdiff1d(np.arange(len(whole)), amplitudes), *amplitudes]
+        scale = np.sqrt(np.diag(total))[order]
+        factor = scale[:, None] * np.linalg.cholesky(total[np.ix_(order, order)] / np.outer(scale, scale))
+        last = factor[-len(amplitudes) :, -len(amplitudes) :]
+        score = last @ np.linalg.solve(factor, (whole.T @ self.score)[order])[-len(amplitudes) :]
+        prior = (change.T @ change)[np.ix_(amplitudes, amplitudes)]
+        return last @ last.T - prior, score
 
 
-DIRECTIONS = 200  # number of random directions of an effect for which the separation is computed
+class LogEvidence(NamedTuple):
+    """Log evidences of both causes relative to none of them, in the order of the pair."""
+
+    first: float
+    second: float
 
 
 @dataclass(frozen=True)
-class Realised:
-    """Log Bayes factors over flights where one rival is hidden."""
+class Weighing:
+    """What the readings of a stage say of a pair of causes, each with the prior of a diagnosis."""
 
-    truth: str  # label of the hidden rival
-    detected: Floats  # (S,): log Bayes factors of the truth against no cause at all, from the first manoeuvre alone
-    factors: Mapping[str, Floats]  # log Bayes factors of the truth against its rival, by stage
+    problem: Problem  # with the criterion `Separation`, adapted to its family, last
+    change: Floats  # see `Linearised.left`
+    amplitudes: Sequence[int]  # see `Linearised.left`
+
+    @classmethod
+    def of(cls, problem: Problem) -> Weighing:
+        """Return the weighing with the rivals and the prior of a problem."""
+        change, amplitudes = in_double_precision(cls._separation(problem).coordinates)(problem.plan)
+        return cls(problem, np.asarray(change), list(map(int, amplitudes)))
+
+    @staticmethod
+    def _separation(problem: Problem) -> Separation:
+        return next(criterion for criterion in problem.criteria if isinstance(criterion, Separation))
+
+    @property
+    def criterion(self) -> Separation:
+        """Criterion whose prior is used."""
+        return self._separation(self.problem)
+
+    def evidence(self, readings: Linearised) -> LogEvidence:
+        """Return the evidences from what was recorded."""
+        information, score = readings.left(self.change, self.amplitudes)
+        values, start = [], 0
+        for prior in self.criterion.priors(self.problem.plan):
+            part = slice(start, start := start + len(prior.scale_of))
+            values.append(in_double_precision(log_evidence)(information[part, part], score[None, part], prior.grid)[0])
+        return LogEvidence(*map(float, values))
+
+    def relative(self, label: str, amplitudes: Floats) -> Floats:
+        """Return amplitudes in SI units, (..., k), in units of their largest plausible sizes."""
+        return np.asarray(amplitudes / effect_of(self.problem.plan, label)[1])
+
+    def predict(self, plan: Linearised, amplitudes: Sequence[Floats], rng: np.random.Generator) -> list[DecisionRate]:
+        """Return the rate of decisions for each cause with amplitudes (d, k), in units of their largest sizes."""
+        information, _ = plan.left(self.change, self.amplitudes)
+        draws = Draws(amplitudes, rng.normal(size=(len(amplitudes[0]), len(information))))
+        margins = decided_margins(information, self.criterion.priors(self.problem.plan), draws)
+        return [DecisionRate.of(row >= 0.0) for row in margins]
 
 
-def references(motions: Mapping[str, Motion], arm_spread: float = ARM_SPREAD) -> dict[str, Reference]:
-    """Return the manoeuvres linearised about the drifting base, with both rivals as unknowns.
+@dataclass(frozen=True)
+class Designed:
+    """A designed manoeuvre."""
+
+    costs: dict[str, float]  # values of both criteria by name
+    largest: dict[str, float]  # largest values of the limited quantities by name
+    motion: ParameterisedMotion  # motion of the joints
+    rates: dict[str, DecisionRate]  # rates of decisions expected under the prior of each cause, by its label
+
+
+def separating_problem(pair: Pair, points: int = mission.POINTS, arm_spread: float = ARM_SPREAD) -> Problem:
+    """Return the problem: six joints on B-splines within the flight's rule, volume and separation as criteria.
+
+    Manoeuvres start at the rate that the first manoeuvre has shown, and what the first manoeuvre says of all other
+    unknowns is known.
+    """
+    model = rival_model(pair, arm_spread)
+    problem = mission.problem(model, mission.splines(points), DOptimal(), Separation(pair.labels))
+    unknowns = problem.plan.unknowns
+    z = drifting(unknowns)
+    first = Linearised.of(Reference.of(model, mission.flight_manoeuvre(), z))
+    rates = np.arange(unknowns.size)[unknowns.layout.all_rates]
+    shared = np.setdiff1d(np.arange(unknowns.size), rates)
+    precision = np.eye(unknowns.size)
+    precision[np.ix_(shared, shared)] += unexplained_information(first.information, shared, rates)
+    return problem.knowing(Known(z, precision))
+
+
+def unexplained_information(information: Floats, group: Sequence[int], rest: Sequence[int]) -> Floats:
+    """Return the information about a group of unknowns that the rest cannot imitate, shape (group, group).
 
     Parameters
     ----------
+    information : (n, n) array; information about all unknowns, without their prior
+    group, rest : sequences of int; unknowns of interest, and those to be marginalised with a standard normal prior
+    """
+    inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
+    cross = information[np.ix_(rest, group)]
+    return np.asarray(information[np.ix_(group, group)] - cross.T @ np.linalg.solve(inner, cross))
+
+
+def design_both(
+    problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
+) -> tuple[Problem, dict[str, Designed]]:
+    """Design by both criteria from the same random starts, the second also from the first's best.
+
+    The problem is returned with its criteria adapted to what manoeuvres of the family resolve.
+    """
+    problem = adapted_to_family(problem, np.random.default_rng(seed))
+    optima: list[np.ndarray] = []
+    for criterion in problem.criteria:
+        kept = store.of(" ".join((criterion.name, *Weighing.of(problem).criterion.rivals)))
+        best = optimise(
+            problem,
+            criterion,
+            np.random.default_rng(seed),
+            search,
+            first=optima,
+            known=kept.known,
+            keep=kept.keep,
+            progress=lambda _, text: progress(text),
+        )
+        optima.append(best.parameters)
+    return problem, {
+        criterion.name: Designed(
+            costs=problem.costs(best),
+            largest={limit.name: limit.largest for limit in problem.reached(best)},
+            motion=problem.plan.family.motion(best),
+            rates=decisions(problem, best, np.random.default_rng(seed)),
+        )
+        for criterion, best in zip(problem.criteria, optima, strict=True)
+    }
+
+
+def references(pair: Pair, motions: Mapping[str, Motion], arm_spread: float = ARM_SPREAD) -> dict[str, Reference]:
+    """Return the manoeuvres linearised about the drifting base, with both causes as unknowns.
+
+    Parameters
+    ----------
+    pair : Pair
     motions : mapping of str to Motion
     arm_spread : float; relative width of the links' priors
     """
-    model = rival_model(RIVALS, arm_spread)
+    model = rival_model(pair, arm_spread)
     z = drifting(mission.problem(model, mission.splines()).plan.unknowns)
     return {name: Reference.of(model, motion, z) for name, motion in motions.items()}
 
@@ -261,111 +262,130 @@ def joined(single: Mapping[str, Linearised], names: Sequence[str]) -> Linearised
     return total
 
 
-def expectations(
-    known: Mapping[str, Reference], seed: int
-) -> tuple[dict[tuple[str, str], Expected], dict[tuple[str, str], list[Expected]]]:
-    """Expect the Bayes factors of all truths and stages, and for effects of the same size in random directions."""
+Case = tuple[str, str, str]  # label of the hidden cause, its direction of `DIRECTIONS`, and the stage
+
+
+def predictions(pair: Pair, weighing: Weighing, known: Mapping[str, Reference], seed: int) -> dict[Case, DecisionRate]:
+    """Predict the rates of decisions for causes of the stated size, in the stated and in random directions."""
     single = {name: Linearised.of(reference) for name, reference in known.items()}
-    directions = np.random.default_rng(seed).normal(size=(DIRECTIONS, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    expected: dict[tuple[str, str], Expected] = {}
-    turned: dict[tuple[str, str], list[Expected]] = {}
-    for stage, names in STAGES.items():
-        total = joined(single, names)
-        for truth in RIVALS:
-            hidden = amplitude(truth)
-            expected[truth, stage] = total.expect(truth, hidden)
-            others = np.pad(np.linalg.norm(hidden) * directions, ((0, 0), (len(hidden) - 3, 0)))
-            turned[truth, stage] = [total.expect(truth, other) for other in others]
-    return expected, turned
+    rng = np.random.default_rng(seed)
+    predicted: dict[Case, DecisionRate] = {}
+    for direction in DIRECTIONS:
+        amplitudes = [
+            weighing.relative(cause.label, np.array([_amplitudes(cause, direction, rng) for _ in range(PREDICTED)]))
+            for cause in pair.causes
+        ]
+        for stage, names in STAGES.items():
+            rates = weighing.predict(joined(single, names), amplitudes, rng)
+            predicted |= {(label, direction, stage): rate for label, rate in zip(pair.labels, rates, strict=True)}
+    return predicted
 
 
-def flown(motion: Motion, truth: str, size: Floats, **options: Any) -> Truth:
-    """Fly a manoeuvre of the drifting base with one of the rivals hidden.
+def _amplitudes(cause: Cause, direction: str, rng: np.random.Generator) -> Floats:
+    return cause.amplitudes if direction == "stated" else cause.turned(rng)
 
-    Parameters
-    ----------
-    motion : Motion; motion of the joints
-    truth : str; label of the rival, or empty for none
-    size : (3,) array; momentum of the wheels [N m s] or torque of the leak [N m], base axes
-    **options
-        Further arguments of `studies.common.mission.fly`.
-    """
-    hidden: dict[str, Any] = {}
-    if truth == "wheel-momentum":
-        hidden = {"rotor": light_wheel(size)}
-    elif truth == "thruster-leak":
-        hidden = {"fields": [leak((0.0, 0.0, 0.0), size)]}
-    return mission.fly(motion, rate=DRIFT, **hidden, **options)
+
+@dataclass(frozen=True)
+class Realised:
+    """Log Bayes factors over flights with a hidden cause."""
+
+    label: str  # of the cause
+    direction: str  # one of `DIRECTIONS`
+    detected: Floats  # (S,): log Bayes factors of the truth against neither cause, from the first manoeuvre alone
+    factors: Mapping[str, Floats]  # log Bayes factors of the truth against its rival, by stage
 
 
 def realise(
+    pair: Pair,
+    weighing: Weighing,
     motions: Mapping[str, Motion],
     known: Mapping[str, Reference],
-    noises: int,
+    flights: int,
     seed: int,
     store: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
     arm_spread: float = ARM_SPREAD,
 ) -> list[Realised]:
-    """Fly all manoeuvres with each rival hidden, and compare the models; each time with another arm, bias and noise.
+    """Fly all manoeuvres with each cause hidden, and weigh both; each time with another arm, bias and noise.
 
     Parameters
     ----------
+    pair : Pair
+    weighing : Weighing
     motions : mapping of str to Motion
     known : mapping of str to Reference; the same manoeuvres linearised, with the links' priors of the same width
-    noises : int; number of sets of flights for each truth
+    flights : int; number of sets of flights for each cause and direction
     seed, store, progress
         See `studies.common.monte_carlo.run_trials`.
     arm_spread : float; relative width of the distribution from which the true arm is drawn
     """
 
-    def compared(task: tuple[str, int], rng: np.random.Generator) -> dict[str, Any]:
+    def compared(task: tuple[str, str, int], rng: np.random.Generator) -> dict[str, Any]:
         """Return the log Bayes factors of one truth from one set of flights."""
-        truth, _ = task
+        label, direction, _ = task
+        cause = pair.cause(label)
         robot, bias = mission.true_arm(mission.published_robot(), rng, arm_spread), BIAS * rng.standard_normal(3)
-        single = {}
-        for name, motion in motions.items():
-            run = flown(motion, truth, TRUTHS[truth], robot=robot)
-            single[name] = Linearised.of(known[name], mission.recorded(run, rng, name, bias))
-        detected = _evidence(single["first"], truth) - _evidence(single["first"], "")
+        robot, hidden = cause.hide(_amplitudes(cause, direction, rng), robot)
+        single = {
+            name: Linearised.of(
+                known[name], mission.recorded(mission.fly(motion, robot, rate=DRIFT, **hidden), rng, name, bias)
+            )
+            for name, motion in motions.items()
+        }
+        true = pair.labels.index(label)
         factors = []
         for names in STAGES.values():
-            total = joined(single, names)
-            values = {label: _evidence(total, label) for label in RIVALS}
-            factors.append(2.0 * values[truth] - sum(values.values()))
-        return {"detected": detected, "factors": factors}
+            evidence = weighing.evidence(joined(single, names))
+            factors.append(evidence[true] - evidence[1 - true])
+        return {"detected": weighing.evidence(single["first"])[true], "factors": factors}
 
-    tasks = [(truth, number) for number in range(noises) for truth in RIVALS]
-    outcomes = run_trials(compared, tasks, store, seed=seed, progress=lambda text: progress(f"flights: {text}"))
+    cases = [(label, direction) for direction in DIRECTIONS for label in pair.labels]
+    tasks = [(*case, number) for number in range(flights) for case in cases]
+    outcomes = run_trials(compared, tasks, store, seed=seed, progress=lambda text: progress(f"{pair.name}: {text}"))
     results, rows = outcomes.complete(), []
-    for index, truth in enumerate(RIVALS):
-        part = results[index :: len(RIVALS)]
+    for index, (label, direction) in enumerate(cases):
+        part = results[index :: len(cases)]
         factors = np.array([outcome["factors"] for outcome in part]).T
         detected = np.array([outcome["detected"] for outcome in part])
-        rows.append(Realised(truth, detected, dict(zip(STAGES, factors, strict=True))))
+        rows.append(Realised(label, direction, detected, dict(zip(STAGES, factors, strict=True))))
     return rows
 
 
-def _evidence(linearised: Linearised, label: str) -> float:
-    """Return the log evidence of the model with one rival, or with neither where the label is empty."""
-    return linearised.log_evidence(linearised.without([other for other in RIVALS if other != label]))
+FLIGHTS = 400  # number of sets of flights for each cause and direction in a full run
+FULL, QUICK = THOROUGH, Search(starts=2, iterations=40)  # effort of each search of a full and of a quick run
 
 
-FLIGHTS = 400  # number of sets of flights for each cause in a full run
-FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)  # effort of each search of a full and of a quick run
+@dataclass(frozen=True)
+class PairResult:
+    """Outcome for one pair of causes."""
+
+    pair: Pair
+    designs: Mapping[str, Designed]  # designed manoeuvres by their criterion
+    motions: Mapping[str, Motion]  # all manoeuvres, the ``first`` among them
+    predicted: Mapping[Case, DecisionRate]  # predicted rates of decisions
+    realised: Sequence[Realised]  # what was realised, one for each cause and direction
+
+    def rate(self, realised: Realised, stage: str) -> DecisionRate:
+        """Return the realised rate of decisions in a stage."""
+        return DecisionRate.of(realised.factors[stage] >= NEEDED)
+
+    def deviation(self, realised: Realised, stage: str) -> float:
+        """Return the difference of the realised from the predicted rate, in its standard errors.
+
+        The standard error is the one of as many flights as were made, where the prediction is right.
+        """
+        predicted = self.predicted[realised.label, realised.direction, stage]
+        count = len(realised.factors[stage])
+        middle = (predicted.rate * predicted.draws + 1.0) / (predicted.draws + 2.0)  # never zero or one
+        error = np.sqrt(middle * (1.0 - middle) * (1.0 / count + 1.0 / predicted.draws))
+        return float((self.rate(realised, stage).rate - predicted.rate) / error)
 
 
 @dataclass(frozen=True)
 class Result:
     """Outcome of the study."""
 
-    designs: Mapping[str, Designed]  # designed manoeuvres by their criterion
-    motions: Mapping[str, Motion]  # all manoeuvres, the ``first`` among them
-    expected: Mapping[tuple[str, str], Expected]  # expectations of linear theory
-    # expectations for effects of the same size in random directions
-    directions: Mapping[tuple[str, str], Sequence[Expected]]
-    realised: Sequence[Realised]  # realised log Bayes factors, one for each truth
+    pairs: Sequence[PairResult]
     search: Search  # effort of each search
     full: bool
 
@@ -377,6 +397,7 @@ def run(
     points: int = mission.POINTS,
     search: Search | None = None,
     flights: int | None = None,
+    pairs: Sequence[str] | None = None,
     store: Store | None = None,
     trials: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
@@ -387,13 +408,21 @@ def run(
     ----------
     points : int; number of free control points of every joint
     search : Search, optional; effort of each design
+    pairs : sequence of str, optional; names of the pairs, by default all in a full run and else the first
     """
     search = search or (FULL if full else QUICK)
-    flights = (FLIGHTS if full else 40) if flights is None else flights
-    designs = design_both(separating_problem(points), seed, search, store or Store.forgetful(), progress)
-    motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
-    motions |= {name: design.motion for name, design in designs.items()}
-    known = references(motions)
-    expected, directions = expectations(known, seed)
-    realised = realise(motions, known, flights, seed, trials, progress)
-    return Result(designs, motions, expected, directions, realised, search, full and flights >= FLIGHTS)
+    flights = (FLIGHTS if full else 10) if flights is None else flights
+    chosen = [PAIRS[name] for name in (pairs or (list(PAIRS) if full else list(PAIRS)[:1]))]
+    store, results = store or Store.forgetful(), []
+    for pair in chosen:
+        problem, designs = design_both(separating_problem(pair, points), seed, search, store, progress)
+        motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
+        motions |= {name: design.motion for name, design in designs.items()}
+        known, weighing = references(pair, motions), Weighing.of(problem)
+        predicted = predictions(pair, weighing, known, seed)
+        kept = (
+            None if trials is None else trials.with_name(f"{trials.stem}-{pair.name.replace(' ', '-')}{trials.suffix}")
+        )
+        realised = realise(pair, weighing, motions, known, flights, seed, kept, progress)
+        results.append(PairResult(pair, designs, motions, predicted, realised))
+    return Result(results, search, full and flights >= FLIGHTS and len(chosen) == len(PAIRS))
