@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 
 from bayesid import Manoeuvre, Model
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid._math.double_precision import in_double_precision
 from bayesid.design import THOROUGH, DecisionRate, DOptimal, Problem, Search, Separation, Store, optimise
-from bayesid.design.decision_rate import DECISION, Draws, decided_margins, log_evidence
+from bayesid.design.decision_rate import DECISION, RivalDraws, decided_margins, log_evidence
 from bayesid.design.design_problem import Known
 from bayesid.design.design_result import decisions
-from bayesid.design.rival_prior import effect_of
+from bayesid.design.rival_prior import ScaleGrid, effect_of
 from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.inference.unknowns import Unknowns
@@ -114,6 +115,11 @@ class Linearised:
         return last @ last.T - prior, score
 
 
+@in_double_precision
+def _log_evidence(information: Floats, score: Floats, grid: ScaleGrid) -> float:
+    return float(log_evidence(jnp.asarray(information), jnp.asarray(score), grid)[0])
+
+
 class LogEvidence(NamedTuple):
     """Log evidences of both causes relative to none of them, in the order of the pair."""
 
@@ -150,8 +156,8 @@ class Weighing:
         values, start = [], 0
         for prior in self.criterion.priors(self.problem.plan):
             part = slice(start, start := start + len(prior.scale_of))
-            values.append(in_double_precision(log_evidence)(information[part, part], score[None, part], prior.grid)[0])
-        return LogEvidence(*map(float, values))
+            values.append(_log_evidence(information[part, part], score[None, part], prior.grid))
+        return LogEvidence(*values)
 
     def relative(self, label: str, amplitudes: Floats) -> Floats:
         """Return amplitudes in SI units, (..., k), in units of their largest plausible sizes."""
@@ -160,7 +166,7 @@ class Weighing:
     def predict(self, plan: Linearised, amplitudes: Sequence[Floats], rng: np.random.Generator) -> list[DecisionRate]:
         """Return the rate of decisions for each cause with amplitudes (d, k), in units of their largest sizes."""
         information, _ = plan.left(self.change, self.amplitudes)
-        draws = Draws(amplitudes, rng.normal(size=(len(amplitudes[0]), len(information))))
+        draws = RivalDraws(amplitudes, rng.normal(size=(len(amplitudes[0]), len(information))))
         margins = decided_margins(information, self.criterion.priors(self.problem.plan), draws)
         return [DecisionRate.of(row >= 0.0) for row in margins]
 
@@ -193,13 +199,13 @@ def separating_problem(pair: Pair, points: int = mission.POINTS, arm_spread: flo
     return problem.knowing(Known(z, precision))
 
 
-def unexplained_information(information: Floats, group: Sequence[int], rest: Sequence[int]) -> Floats:
+def unexplained_information(information: Floats, group: Integers, rest: Integers) -> Floats:
     """Return the information about a group of unknowns that the rest cannot imitate, shape (group, group).
 
     Parameters
     ----------
     information : (n, n) array; information about all unknowns, without their prior
-    group, rest : sequences of int; unknowns of interest, and those to be marginalised with a standard normal prior
+    group, rest : arrays of int; unknowns of interest, and those to be marginalised with a standard normal prior
     """
     inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
     cross = information[np.ix_(rest, group)]

@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from bayesid import Effect, Robot
 from bayesid._math.arrays import Floats
+from bayesid._math.double_precision import in_double_precision
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.log_cholesky import log_cholesky_vector
 from bayesid.simulation.effects import LinkInertia, MagneticDipole, Payload, ThrusterLeak, ThrusterPulses, WheelMomentum
@@ -90,8 +92,9 @@ def _with_moments(amplitudes: Floats, robot: Robot) -> Hidden:
     return robot.with_inertial(HAND, InertialParameters.from_vector(vector)), {}
 
 
+@in_double_precision
 def _with_error(amplitudes: Floats, robot: Robot) -> Hidden:
-    vector = np.asarray(log_cholesky_vector(robot.link(LINK).inertial, amplitudes))
+    vector = np.asarray(log_cholesky_vector(robot.link(LINK).inertial, jnp.asarray(amplitudes)))
     return robot.with_inertial(LINK, InertialParameters.from_vector(vector)), {}
 
 
