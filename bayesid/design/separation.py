@@ -33,8 +33,8 @@ class Separation(Criterion):
     A decision gives the true rival a probability of 0.9 or more against the others, all equally probable beforehand.
     Size and direction of the true one follow the prior that a diagnosis gives it (`RivalPrior`). All other unknowns
     are marginalised, and the readings are linear in amplitudes and unknowns about the prior's centre
-    (`bayesid.design.decision_rate`). Earlier manoeuvres count with their readings averaged, as if these were still to come.
-    The model of the plan must contain the rivals.
+    (`bayesid.design.decision_rate`). Earlier manoeuvres count with their readings averaged, as if these were still to
+    come. The model of the plan must contain the rivals.
 
     Parameters
     ----------
