@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
-from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
+from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped, whirling_rate
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from studies.truth.bodies import SERVICER3
@@ -52,3 +52,15 @@ def test_a_garbled_reading_is_told_from_a_wrong_unit(count, words):
     angle[100 : 100 + count] = 57.0
     with pytest.raises(InputError, match=words):
         refuse_impossible_motion(flown(angle), LIMITED)
+
+
+@pytest.mark.parametrize(("interval", "refused"), [(0.005, False), (0.1, True)])
+def test_a_fast_base_is_refused_only_where_its_readings_are_too_far_apart_to_follow_it(interval, refused):
+    time = interval * np.arange(200)
+    recording = Recording("thrown", None, time, {"rate.x": np.full(200, 24.2)})
+    assert whirling_rate(recording) == ("rate.x", 24.2)
+    if refused:
+        with pytest.raises(InputError, match=r"exceed 24.2 rad/s, 2.4 rad between readings. Give rates in rad/s"):
+            refuse_impossible_motion(recording, LIMITED)
+    else:
+        refuse_impossible_motion(recording, LIMITED)

@@ -16,6 +16,7 @@ from bayesid.inference.predicted_readings import PredictedReadings, readings_at_
 from bayesid.recording.blocks import Blocks
 from bayesid.recording.full_rate import ChannelSpectrum, channel_spectrum, spikes
 from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.plausibility import whirling_rate
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
 from bayesid.recording.suspect_readings import SuspectReadings, suspect_readings
 from bayesid.robot.robot import Robot
@@ -139,6 +140,8 @@ class RecordingCheck:
         Spectrum of every channel of sensors and joints, and what is above the rate of the blocks.
     suspects : tuple of SuspectReadings
         Readings that no sensor gives.
+    whirling : pair of str and float or None
+        Column of the base's rate and its median size [rad/s] where that is unusually fast.
     """
 
     name: str
@@ -151,11 +154,17 @@ class RecordingCheck:
     unused: tuple[str, ...] = ()
     suspects: tuple[SuspectReadings, ...] = ()
     spectra: tuple[ChannelSpectrum, ...] = ()
+    whirling: tuple[str, float] | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on properties of the recording that need attention."""
         sentences = [f"{suspect}" for suspect in self.suspects]
+        if self.whirling is not None:
+            column, speed = self.whirling
+            sentences.append(
+                f"Half of the readings of {column} exceed {speed:.3g} rad/s, which is unusual: are they in rad/s?"
+            )
         sentences += [remark for spectrum in self.spectra for remark in spectrum.remarks]
         sentences += [
             f"Joint {joint.name} moves by only {joint.highest - joint.lowest:.2g} {joint.unit}."
@@ -238,6 +247,7 @@ def _check(posterior: Posterior, index: int, predicted: PredictedReadings) -> Re
         unused=_unused(recording, model),
         suspects=tuple(suspect_readings(recording)),
         spectra=_spectra(posterior, index),
+        whirling=whirling_rate(recording),
     )
 
 

@@ -14,12 +14,13 @@ from bayesid.recording.recording import Recording
 from bayesid.recording.units import ANGLES, UNITS
 from bayesid.robot.robot import Joint, Robot
 
-__all__ = ["refuse_impossible_joints", "refuse_impossible_motion", "unwrapped"]
+__all__ = ["refuse_impossible_joints", "refuse_impossible_motion", "unwrapped", "whirling_rate"]
 
 FASTEST = 5.0  # speed of a joint relative to its limit that none reaches
 READING_ERROR = 0.01  # largest change of a reading by the noise and the steps of a coarse encoder [rad or m]
 SPAN = 1.0  # time in which a joint in wrong units moves by much more than that error even where its limit is low [s]
-FASTEST_BASE = 20.0  # angular speed of the base that no free-flying robot keeps up, some three turns a second [rad/s]
+FASTEST_BASE = 20.0  # angular speed of the base above which rates are rarely in rad/s, three turns per second [rad/s]
+FOLLOWED = 1.0  # rotation from one reading to the next beyond which they do not determine the motion between [rad]
 TURN = 2.0 * np.pi  # by which an angle jumps where its reading begins anew [rad]
 NEAR_TURN = 0.5  # difference from a turn by which a joint may move from one sample to the next beside the jump [rad]
 GARBLED = 0.01  # share of the samples up to which those outside the limits are garbled, not in another unit
@@ -30,7 +31,7 @@ RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the 
 
 
 def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
-    """Refuse what degrees or arcseconds make of radians: joints far outside their limits, and a base that whirls.
+    """Refuse what degrees or arcseconds make of radians: joints far outside their limits, a base too fast to follow.
 
     Parameters
     ----------
@@ -41,30 +42,46 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
     ------
     InputError
         If a position is beyond a limit by more than a tenth of the range, a speed is above five times its limit, or
-        most rates of the base are above 20 rad/s.
+        most rates of the base are above 20 rad/s and turn it by more than a radian from one reading to the next.
     """
     refuse_impossible_joints(recording, robot)
-    for name in RATE:
-        readings = recording.series(name)[1] if name in recording.channels else np.zeros(0)
-        if readings.size:
-            speed = float(np.median(np.abs(readings)))  # single readings may be garbled
-            if speed > FASTEST_BASE:
-                problem = f"half of the readings exceed {speed:.3g} rad/s, more than three turns per second"
-                remedy = "Give rates in rad/s, not in arcseconds or degrees per second"
-                units = [u for u, f in UNITS["rate"].items() if f * speed < FASTEST_BASE and u in ("deg/s", "arcsec/s")]
-                conventions = [
-                    Convention(
-                        "convention:unit:rate",
-                        "rate",
-                        f'[sensors.rate]\nunit = "{unit}"',
-                        f"The readings of rate are in {unit}, not in rad/s.",
-                        1.0 / len(units),
-                    )
-                    for unit in units
-                ]
-                raise ConventionError(
-                    conventions, problem, file=recording.file or recording.name, place=f"column {name}", remedy=remedy
-                )
+    whirling = whirling_rate(recording)
+    if whirling is None or whirling[1] * recording.interval(whirling[0]) < FOLLOWED:
+        return
+    name, speed = whirling
+    units = [u for u, f in UNITS["rate"].items() if f * speed < FASTEST_BASE and u in ("deg/s", "arcsec/s")]
+    conventions = [
+        Convention(
+            "convention:unit:rate",
+            "rate",
+            f'[sensors.rate]\nunit = "{unit}"',
+            f"The readings of rate are in {unit}, not in rad/s.",
+            1.0 / len(units),
+        )
+        for unit in units
+    ]
+    raise ConventionError(
+        conventions,
+        f"half of the readings exceed {speed:.3g} rad/s, {speed * recording.interval(name):.2g} rad between readings",
+        file=recording.file or recording.name,
+        place=f"column {name}",
+        remedy="Give rates in rad/s, not in arcseconds or degrees per second",
+    )
+
+
+def whirling_rate(recording: Recording) -> tuple[str, float] | None:
+    """Return the column of the fastest rate of the base and its median size [rad/s] where that is above 20 rad/s.
+
+    Such a rate is unusual and not impossible: small bodies that are thrown by hand turn as fast.
+
+    Parameters
+    ----------
+    recording : Recording
+    """
+    # single readings may be garbled
+    speeds = {name: float(np.median(np.abs(recording.series(name)[1]))) for name in RATE if name in recording.channels}
+    name = max(speeds, key=lambda column: speeds[column], default="")
+    return (name, speeds[name]) if name and speeds[name] > FASTEST_BASE else None
 
 
 def unwrapped(recording: Recording, robot: Robot) -> Recording:
