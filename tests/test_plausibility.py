@@ -57,7 +57,8 @@ def test_a_garbled_reading_is_told_from_a_wrong_unit(count, words):
 @pytest.mark.parametrize(("interval", "refused"), [(0.005, False), (0.1, True)])
 def test_a_fast_base_is_refused_only_where_its_readings_are_too_far_apart_to_follow_it(interval, refused):
     time = interval * np.arange(200)
-    recording = Recording("thrown", None, time, {"rate.x": np.full(200, 24.2)})
+    still = {"rate.y": np.zeros(200), "rate.z": np.zeros(200)}
+    recording = Recording("thrown", None, time, {"rate.x": np.full(200, 24.2), **still})
     assert whirling_rate(recording) == ("rate.x", 24.2)
     if refused:
         with pytest.raises(InputError, match=r"exceed 24.2 rad/s, 2.4 rad between readings. Give rates in rad/s"):
