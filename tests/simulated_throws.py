@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from studies.throws.data import ACCEL_SCALE, RATE_SCALE, SIGNS, WHEEL_COUNT, WHEEL_INERTIA, Timing
+from studies.throws.data import WHEEL_INERTIA
+from studies.throws.raw import ACCEL_SCALE, ERPM, RATE_SCALE, SIGNS, Timing
 
 MASS = 0.28
 INERTIA = np.array([[2.3e-4, 4e-6, -3e-6], [4e-6, 5.2e-4, 5e-6], [-3e-6, 5e-6, 4.6e-4]])
@@ -32,7 +33,7 @@ def wheel(time):
 def write_throws(folder: Path, body: str, rates, rng, *, drag=(0.0, 0.0, 0.0), tilt=(0.0, 0.0), shake=0.0) -> None:
     """Write one file for each initial rate [rad/s], with drag coefficients [N m s] and a tilted wheel [rad].
 
-    A force on the x axis of the accelerometer shakes at 6/7 of the wheel's speed with an amplitude, at 1000 rad/s, of
+    A force on the x axis of the accelerometer shakes once per turn of the wheel with an amplitude, at 1000 rad/s, of
     ``shake`` [m/s2].
     """
     (folder / "throws").mkdir(parents=True, exist_ok=True)
@@ -51,7 +52,7 @@ def write_throws(folder: Path, body: str, rates, rng, *, drag=(0.0, 0.0, 0.0), t
         slope = np.array([change(t, w) for t, w in zip(clock, rate, strict=True)])
         force = -np.cross(slope, COM) - np.cross(rate, np.cross(rate, COM))
         speed = np.abs(wheel(clock)[0])
-        turn = 6.0 / 7.0 * np.cumsum(speed) * (clock[1] - clock[0])
+        turn = np.cumsum(speed) * (clock[1] - clock[0])
         force[:, 0] += shake * (speed / 1000.0) ** 2 * np.cos(turn)
         columns = [1e6 * clock]
         for values, noise, scale in ((rate, RATE_NOISE, RATE_SCALE), (force, ACCEL_NOISE, ACCEL_SCALE)):
@@ -67,8 +68,8 @@ def _held(clock):
     timing, time, reading = Timing(), clock[0], np.zeros(len(clock))
     late = 0.5 * (clock[1] - clock[0])  # of a reading until the next raw sample, on average
     while time < clock[-1]:
-        period = 60.0 / (100.0 * abs(wheel(time)[0]) / WHEEL_COUNT)
+        period = 2.0 * np.pi / (ERPM * abs(wheel(time)[0]) / timing.wheel_count)
         at = time + late - timing.delay - timing.delay_periods * period
-        reading[clock >= time] = np.round(abs(wheel(at)[0]) / WHEEL_COUNT)
+        reading[clock >= time] = np.round(abs(wheel(at)[0]) / timing.wheel_count)
         time += period
     return reading

@@ -1,15 +1,17 @@
 """Simulated throws through the reader of the measured ones: noise as declared, and causes that are known."""
 
 import json
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from bayesid.diagnosis import Status, diagnose
-from studies.throws.data import SMOOTH, Timing, quiet_noise, read_throws, read_truth, regress
+from studies.throws.data import SMOOTH, quiet_noise, raw_throws, read_throws, read_truth, regress
 from studies.throws.diagnosis import SPREAD, device_candidates
 from studies.throws.model import extended, manoeuvres, rigid
-from studies.throws.residual import ORDERS, orders_of
+from studies.throws.raw import Timing
+from studies.throws.rotor import ORDERS, lines_of, loudest_orders, near, pole_pairs, speed_ratio
 from tests.simulated_throws import ACCEL_NOISE, COM, INERTIA, MASS, RATE_NOISE, write_throws
 
 RATES = np.array([[11.0, -9.0, 4.0], [-7.0, 12.0, 8.0], [15.0, 5.0, -9.0], [6.0, -14.0, 7.0]])
@@ -31,7 +33,7 @@ def test_samples_are_independent_and_their_noise_is_measured(tmp_path):
     write_throws(tmp_path, "body", np.zeros((8, 3)), np.random.default_rng(3))
     recordings = read_throws(tmp_path, "body", Timing(fast=1e9))
     # the body is at rest about x until the wheel runs up, so that all that is read there is noise
-    noise = np.array([recording.vector("rate")[1][:20, 0] for recording in recordings])
+    noise = np.array([recording.vector("rate")[1][:8, 0] for recording in recordings])
     noise = noise - noise.mean(axis=1, keepdims=True)
     correlation = (noise[:, 1:] * noise[:, :-1]).mean() / (noise**2).mean()
     assert abs(correlation) < 0.25  # 0.78 before samples were independent
@@ -63,13 +65,22 @@ def test_the_regression_needs_the_mass_alone(tmp_path):
     np.testing.assert_allclose(found.com, COM, atol=0.001)
 
 
-@pytest.mark.parametrize(("shake", "there"), [(0.0, False), (0.5, True)])
-def test_a_wheel_that_shakes_is_seen_at_the_order_of_its_turns(tmp_path, shake, there):
-    write_throws(tmp_path, "body", RATES[:1], np.random.default_rng(6), shake=shake)
-    orders = orders_of(read_throws(tmp_path, "body", Timing())[0], tmp_path)[:, 3]
-    peak = ORDERS[np.argmax(orders)]
-    assert (orders.max() > 10.0 * np.median(orders)) == there
-    assert not there or abs(peak - 6.0 / 7.0) < 0.03
+@pytest.mark.parametrize(("pairs", "ratio"), [(7, Fraction(1)), (6, Fraction(6, 7)), (8, Fraction(8, 7))])
+def test_a_wrong_number_of_pole_pairs_is_found_from_the_line_of_the_imbalance(tmp_path, pairs, ratio):
+    write_throws(tmp_path, "body", RATES[:3], np.random.default_rng(6), shake=0.5)
+    timing = Timing(pole_pairs=pairs)
+    amplitudes = np.abs(np.stack([lines_of(raw, timing, ORDERS) for raw in raw_throws(tmp_path, "body")]))
+    orders = loudest_orders(amplitudes)
+    assert near(orders, float(ratio)) == 3
+    assert speed_ratio(orders, timing) == ratio
+    assert pole_pairs(orders, timing) == 7
+
+
+def test_a_balanced_wheel_has_no_line(tmp_path):
+    write_throws(tmp_path, "body", RATES[:1], np.random.default_rng(6))
+    (raw,) = raw_throws(tmp_path, "body")
+    amplitudes = np.abs(lines_of(raw, Timing(), ORDERS)[:, 3])
+    assert amplitudes.max() < 10.0 * np.median(amplitudes)
 
 
 @pytest.mark.slow

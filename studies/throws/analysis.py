@@ -12,9 +12,10 @@ from scipy.stats import norm
 from bayesid import Posterior
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import bodies_of
-from studies.throws.data import WHEEL_INERTIA, Timing, Truth, read_throws, regress
+from studies.throws.data import WHEEL_INERTIA, Truth, read_throws, regress
 from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, maximise_jointly, width_of
 from studies.throws.model import STEP, extended, is_calibration, is_local, manoeuvres
+from studies.throws.raw import Timing
 from studies.throws.residual import Residual, residual_of
 
 PLATE_SD = 0.03  # relative uncertainty of the plate's moments, which are from the authors' CAD: "a few percent"

@@ -26,6 +26,8 @@ from scipy.ndimage import maximum_filter1d
 
 from bayesid import InertialParameters, InputError, Recording
 from bayesid._math.arrays import Floats
+from studies.throws.raw import IDLE_TURN, RawThrow, Timing
+from studies.throws.rotor import rotor_phases
 
 DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"  # beside the checkout
 
@@ -35,42 +37,15 @@ CALIBRATION = ("cal_device", "cal_proof")
 # throws that are not used, with the reason
 EXCLUDED = {"Empty_LOG00188": "its gyro is saturated; the data folder does not contain it"}
 
-SIGNS = np.array([-1.0, -1.0, 1.0])
-RATE_SCALE = np.pi / 180.0 / 16.384
-ACCEL_SCALE = 9.81 / 2048.0
-POLE_PAIRS = 6  # of the wheel's motor, as the source of the data states; its inertia takes up an error of this number
-WHEEL_COUNT = 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0  # wheel speed of one count of its reading [rad/s]
-
 # nominal inertia of the wheel [kg m2]; every inertia scales with it, and the known box gives its true value
-WHEEL_INERTIA = 1.45e-6
+WHEEL_INERTIA = 1.69e-6
 
-INTERVAL = 0.005  # between samples [s]
+INTERVAL = 0.010  # between samples [s], so long that their filter passes nothing of the wheel at speed, 200 Hz
 
 # width of the weights [s], at which the correlation of neighbouring samples is zero
 SMOOTH = INTERVAL / np.sqrt(14.0 - np.sqrt(88.0))
 
 WHEEL_STEPS = 4  # values of the wheel's momentum per sample
-
-
-@dataclass(frozen=True)
-class Timing:
-    """How a throw is cut; the delays were found on these data."""
-
-    # free flight after the wheel's start [s]
-    start: float = 0.075
-    end: float = 0.555
-    # a reported wheel speed is as old as this [s] plus this many electrical periods, over which it was averaged
-    delay: float = -0.64e-3
-    delay_periods: float = 0.40
-    # wheel acceleration above which its delay is not known well enough [rad/s2]; gyro samples within ``margin`` seconds
-    # of it are left out
-    fast: float = 12000.0
-    margin: float = 0.004
-
-    @property
-    def duration(self) -> float:
-        """Length of a recording [s]."""
-        return self.end - self.start
 
 
 @dataclass(frozen=True)
@@ -120,8 +95,8 @@ def read_truth(folder: Path) -> Truth:
     )
 
 
-def read_throws(folder: Path, body: str, timing: Timing, count: int | None = None) -> list[Recording]:
-    """Read the throws of one body, the first ``count`` of them.
+def raw_throws(folder: Path, body: str, count: int | None = None) -> list[RawThrow]:
+    """Read the raw throws of one body, the first ``count`` of them.
 
     Raises
     ------
@@ -132,38 +107,35 @@ def read_throws(folder: Path, body: str, timing: Timing, count: int | None = Non
     files = [file for file in logs if file.stem not in EXCLUDED]
     if not files:
         raise InputError(f"no throws of {body!r}", file=folder / "throws", remedy=_REMEDY)
-    return [_recording(file, timing) for file in files[:count]]
+    return [RawThrow.read(file) for file in files[:count]]
+
+
+def read_throws(folder: Path, body: str, timing: Timing, count: int | None = None) -> list[Recording]:
+    """Return the samples of the throws of one body, the first ``count`` of them."""
+    raws = raw_throws(folder, body, count)
+    return [_recording(raw, timing, phase) for raw, phase in zip(raws, rotor_phases(raws, timing), strict=True)]
 
 
 _REMEDY = "Give the folder of the thrown-body measurements (SOURCE.txt, truth.json, throws/*.csv)"
 
 
-def read_raw(file: Path) -> tuple[Floats, Floats, Floats]:
-    """Return clock (n,) [s], rate and specific force (n, 6) [rad/s, m/s2], and reading of the wheel (n,) [counts]."""
-    raw = np.genfromtxt(file, delimiter=",", names=True)
-    readings = [
-        sign * scale * raw[f"{kind}{axis}"]
-        for kind, scale in (("g", RATE_SCALE), ("a", ACCEL_SCALE))
-        for axis, sign in zip("xyz", SIGNS, strict=True)
-    ]
-    return raw["t_us"] * 1e-6, np.column_stack(readings), raw["erpm"]
-
-
-def _recording(file: Path, timing: Timing) -> Recording:
-    clock, readings, erpm = read_raw(file)
+def _recording(raw: RawThrow, timing: Timing, phase: float) -> Recording:
+    """Return samples that begin where the wheel's angle, ``phase`` at the start of the flight, is zero."""
+    idle = np.abs(raw.wheel_speed(timing.start + np.linspace(0.0, IDLE_TURN), timing)).mean()
+    start = timing.start + (-phase % (2.0 * np.pi)) / idle
     step = INTERVAL / WHEEL_STEPS
-    grid = timing.start + step * np.arange(WHEEL_STEPS * round(timing.duration / INTERVAL) + 1)
-    kernel = _weights(grid, clock)
-    speed = _wheel_speed(clock, erpm, grid, timing)
+    grid = start + step * np.arange(WHEEL_STEPS * round(timing.duration / INTERVAL) + 1)
+    fine = np.arange(grid[0] - 5.0 * SMOOTH, grid[-1] + 5.0 * SMOOTH, 0.25e-3)
+    speed = _weights(grid, fine) @ raw.wheel_speed(fine, timing)
     acceleration = np.abs(np.gradient(speed, grid))
     fast = maximum_filter1d(acceleration, 2 * round(timing.margin / step) + 1) > timing.fast
     skip = np.arange(len(grid)) % WHEEL_STEPS != 0
     channels: dict[str, Floats] = {"wheel_momentum.x": np.zeros(len(grid)), "wheel_momentum.y": np.zeros(len(grid))}
     channels["wheel_momentum.z"] = WHEEL_INERTIA * speed
-    for index, values in enumerate((kernel @ readings).T):
+    for index, values in enumerate((_weights(grid, raw.clock) @ raw.readings).T):
         family = "rate" if index < 3 else "accel"
         channels[f"{family}.{'xyz'[index % 3]}"] = np.where(skip | fast, np.nan, values)
-    return Recording(file.stem, None, grid - timing.start, channels)
+    return Recording(raw.name, None, grid - start, channels)
 
 
 def _weights(grid: Floats, clock: Floats) -> Floats:
@@ -173,24 +145,14 @@ def _weights(grid: Floats, clock: Floats) -> Floats:
     return np.asarray(kernel / kernel.sum(axis=1, keepdims=True))
 
 
-def _wheel_speed(clock: Floats, erpm: Floats, grid: Floats, timing: Timing) -> Floats:
-    """Wheel speed relative to the body [rad/s], from the instants at which the held reading changes."""
-    new = np.concatenate([[0], np.flatnonzero(np.diff(erpm)) + 1])
-    value, instant = erpm[new], clock[new]
-    period = np.minimum(np.where(value > 0.0, 60.0 / (100.0 * np.maximum(value, 1.0)), 0.0), 0.02)
-    fine = np.arange(grid[0] - 5.0 * SMOOTH, grid[-1] + 5.0 * SMOOTH, 0.25e-3)
-    speed = np.interp(fine, instant - timing.delay - timing.delay_periods * period, -value * WHEEL_COUNT)
-    return _weights(grid, fine) @ speed
-
-
-SPAN, DEGREE = 13, 5  # samples of one polynomial and its degree
+SPAN, DEGREE = 7, 5  # samples of one polynomial and its degree
 QUIET = 2000.0  # wheel acceleration up to which the polynomial follows the motion [rad/s2], a tenth of the largest
 
 
 def quiet_noise(recordings: Sequence[Recording], sensor: str) -> Floats:
     """Return the standard deviation of one sample of a sensor, shape (3,), from all quiet stretches of some recordings.
 
-    Every stretch of thirteen samples gives one residual, that of its middle; its variance is that of a sample times one
+    Every stretch of seven samples gives one residual, that of its middle; its variance is that of a sample times one
     less the weight that the middle has in its own polynomial.
     """
     place = np.vander(np.linspace(-1.0, 1.0, SPAN), DEGREE + 1)

@@ -16,7 +16,7 @@ from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.simulation.effects import Effect
 from studies.throws.analysis import Tensor, object_moments, tensors, wheel_inertia
-from studies.throws.data import POLE_PAIRS, Timing, Truth, regress
+from studies.throws.data import Truth, regress
 from studies.throws.model import (
     KNOTS,
     TORQUE,
@@ -29,6 +29,7 @@ from studies.throws.model import (
     manoeuvres,
     rigid,
 )
+from studies.throws.raw import Timing
 
 SPREAD = 0.1  # relative width of the body's prior about a linear regression on the throws
 TESTING = 2  # throws at most that are predicted
@@ -49,14 +50,14 @@ CATALOGUE = (
 )
 
 
-def device_candidates(model: Model, *, records_wheels: bool, pairs: int = POLE_PAIRS) -> list[Effect]:
+def device_candidates(model: Model, *, records_wheels: bool) -> list[Effect]:
     """Return what such a device may lack: effects of the catalogue, and those that its user wrote.
 
-    Effects of the recorded wheel are candidates where it is recorded; ``pairs`` is the number of its pole pairs.
+    Effects of the recorded wheel are candidates where it is recorded.
     """
     known = candidates(model, records_wheels=records_wheels, longest=Timing().duration)
     of_user = [GyroCross(), GSensitivity(), SmoothTorque(Timing().duration, KNOTS, TORQUE)]
-    wheel = [WheelTilt(), WheelDelay(), WheelImbalance(POLE_PAIRS / pairs)] if records_wheels else []
+    wheel = [WheelTilt(), WheelDelay(), WheelImbalance()] if records_wheels else []
     return [effect for effect in known if effect.label in CATALOGUE] + [
         e.attach(model.robot) for e in (*of_user, *wheel)
     ]
@@ -97,17 +98,15 @@ def lacking(
     training: int,
     seed: int,
     progress: Progress = silent,
-    *,
-    pairs: int = POLE_PAIRS,
 ) -> Lacking:
     """Diagnose the first throws of a body, and predict further ones with the rigid and with the extended model.
 
-    All throws tell the noise. The wheel's motor has a number of pairs of poles (`residual.pole_pairs`).
+    All throws tell the noise.
     """
     used, left = recordings[:training], recordings[training : training + TESTING]
     model = rigid(regress(used, mass), SPREAD, recordings)
     throws = manoeuvres(model, used)
-    effects = device_candidates(model, records_wheels=True, pairs=pairs)
+    effects = device_candidates(model, records_wheels=True)
     diagnosis = diagnose(model, throws, seed, effects=effects, progress=progress)
     taken = _taken(diagnosis)
     plain, longer = Posterior.of(model, throws), extended_posterior(taken)

@@ -28,7 +28,8 @@ from bayesid import (
 from bayesid._math.arrays import Floats
 from bayesid.simulation.effects import Effect, Instant, Parameter, Readings, SensorBias, Situation, Wrench
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
-from studies.throws.data import SMOOTH, WHEEL_COUNT, WHEEL_INERTIA, quiet_noise
+from studies.throws.data import SMOOTH, WHEEL_INERTIA, quiet_noise
+from studies.throws.raw import Timing
 
 STEP = 0.0025  # longest integration step [s], half of the interval between samples
 
@@ -105,26 +106,24 @@ class WheelDelay(Effect):
 
 
 class WheelImbalance(Effect):
-    """Imbalance of the wheel, static and dynamic, which shakes the body once in a turn; its phase differs by throw.
+    """Imbalance of the wheel, the same in all throws: its force, the torque of the force, and the dynamic part.
 
-    The angle of the wheel is the integral of its recorded speed, or of a share of it where the motor has more poles
-    than the record takes it to have. The samples are filtered, and so is what turns faster.
+    A recording begins where the angle of the wheel is zero, so that the angle is the integral of the recorded speed.
+    The force acts in the plane of rotation, beside the accelerometer. Its torque about the wheel's axis is that of its
+    lever in this plane. The torques across the axis of its lever along the axis and of the dynamic imbalance both grow
+    with the square of the speed and have one pair of amplitudes. The samples are filtered, and so is what turns.
 
     Parameters
     ----------
-    share : float; speed of the wheel relative to the recorded one
     static, dynamic : float; standard deviations of the imbalance [kg m, kg m2]
     """
 
     name = "wheel-imbalance"
     summary = "The wheel is out of balance and shakes the body once per turn."
-    per_recording = True
     states = 1
-    constant_names = ("share",)
 
-    def __init__(self, share: float = 1.0, static: float = 1e-7, dynamic: float = 3e-9) -> None:
-        self.share = share
-        parts = ("static", "kg m", static), ("dynamic", "kg m2", dynamic)
+    def __init__(self, static: float = 1e-7, dynamic: float = 3e-9) -> None:
+        parts = ("static", "kg m", static), ("across", "kg m2", dynamic), ("about", "kg m2", dynamic)
         self.parameters = tuple(Parameter(f"{name}.{way}", unit, sd) for name, unit, sd in parts for way in ("c", "s"))
 
     def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
@@ -132,24 +131,25 @@ class WheelImbalance(Effect):
         return self._speed(instant)[None]
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
-        """Return the force of the eccentric mass, which acts near the sensors."""
-        return Wrench(self._speed(instant) ** 2 * self._turned(values[:2], instant, inner), jnp.zeros(3))
-
-    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
-        """Return the momentum of the wheel across its axis, and its derivative at the present speed."""
-        speed = self._speed(instant)
-        momentum = speed * self._turned(values[2:], instant, inner)
-        return momentum, speed * jnp.cross(jnp.array([0.0, 0.0, 1.0]), momentum)
+        """Return the force of the eccentric mass and the torques about the sensor."""
+        static, across, about = values.reshape(3, 2)
+        c, s = jnp.cos(inner[0]), jnp.sin(inner[0])
+        torque = jnp.array([*_turned(across, c, s), about[0] * c + about[1] * s])
+        size = self._gain(instant) * self._speed(instant) ** 2
+        return Wrench(size * jnp.array([*_turned(static, c, s), 0.0]), size * torque)
 
     def _speed(self, instant: Instant) -> Array:
-        return jnp.asarray(self.share * instant.environment.wheel_momentum[2] / WHEEL_INERTIA)
+        return jnp.asarray(instant.environment.wheel_momentum[2] / WHEEL_INERTIA)
 
-    def _turned(self, pair: Array, instant: Instant, inner: Array) -> Array:
-        """Return a vector across the axis that turns with the wheel, as the filter of the samples leaves it."""
+    def _gain(self, instant: Instant) -> Array:
+        """Return the share of the line that the filter of the samples passes."""
         u = self._speed(instant) * SMOOTH
-        gain = (1.0 + 0.5 * u**2) * jnp.exp(-0.5 * u**2)
-        c, s = jnp.cos(inner[0]), jnp.sin(inner[0])
-        return gain * jnp.stack([pair[0] * c - pair[1] * s, pair[0] * s + pair[1] * c, jnp.zeros(())])
+        return (1.0 + 0.5 * u**2) * jnp.exp(-0.5 * u**2)
+
+
+def _turned(pair: Array, c: Array, s: Array) -> tuple[Array, Array]:
+    """Return a vector across the axis after a turn by an angle with cosine and sine."""
+    return pair[0] * c - pair[1] * s, pair[0] * s + pair[1] * c
 
 
 class AirDrag(Effect):
@@ -230,7 +230,7 @@ DRAG = 20.0 * WHEEL_INERTIA  # prior standard deviation of the drag coefficients
 BIAS = 0.1  # prior standard deviation of the accelerometer's constant error in a throw [m/s2]
 
 # least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia
-RESOLUTION = WHEEL_COUNT / np.sqrt(12.0)
+RESOLUTION = Timing().wheel_count / np.sqrt(12.0)
 
 RATE = 150.0  # prior standard deviation of the initial rate [rad/s], wide enough for any throw
 

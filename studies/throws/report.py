@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -21,21 +21,22 @@ from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
 from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult, analyse, prepare
-from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, EXCLUDED, INTERVAL, Timing, read_throws, read_truth
+from studies.throws.data import DEFAULT_FOLDER, EXCLUDED, INTERVAL, raw_throws, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, Lacking, geometry_errors, lacking, without_wheel
 from studies.throws.joint import LARGEST
 from studies.throws.model import is_fitted, is_rigid
+from studies.throws.raw import Timing
 from studies.throws.residual import (
     CHANNELS,
-    ORDERS,
     PHASES,
     Residual,
     following,
-    pole_pairs,
     shaken_axis,
     shaking_words,
 )
+from studies.throws.rotor import ORDERS, lines_of, loudest_orders
 
+MISCOUNTED = 6  # pole pairs of the motor as the source of the data first stated them
 QUICK = 4  # throws of each body that a quick run identifies
 TRAINING = 1  # throws of each body that are diagnosed
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}  # mean errors of a quick least-squares fit by those who prepared the data [%]
@@ -58,7 +59,7 @@ class Result:
     errors: Mapping[str, Mapping[str, np.ndarray]]  # of the diagnosed models against the geometry [%]
     wheels: Mapping[str, Diagnosis]  # with the recorded wheel dropped, by body; empty where that was left out
     masses: Mapping[str, float]  # of the bodies with the device on them [kg]
-    pairs: int  # pole pairs of the wheel's motor, from the calibration throws' loudest line
+    miscounted: np.ndarray  # (throws,): order of the loudest line of all throws, read with `MISCOUNTED` pole pairs
     # time of the run without the reverse, and of the reverse
     seconds: float
     reverse_seconds: float
@@ -96,15 +97,14 @@ def run(
     prepared = prepare(folder, truth, count)
     plain = analyse("rigid", prepared, is_rigid, truth, rng, folder, smooth=False)
     extended = analyse("extended", prepared, is_fitted, truth, rng, folder)
-    pairs = pole_pairs([extended.left[body] for body in CALIBRATION])
+    miscounted = miscounted_orders(folder, truth.bodies, count)
     studies: tuple[Lacking, ...] = ()
     errors: Mapping[str, Mapping[str, np.ndarray]] = {}
     wheels: dict[str, Diagnosis] = {}
     if full:
         recordings = {body: read_throws(folder, body, Timing()) for body in truth.bodies}
         studies = tuple(
-            lacking(body, recordings[body], masses[body], TRAINING, seed, progress, pairs=pairs)
-            for body in truth.bodies
+            lacking(body, recordings[body], masses[body], TRAINING, seed, progress) for body in truth.bodies
         )
         errors = geometry_errors(studies, truth)
     seconds = perf_counter() - began
@@ -112,7 +112,16 @@ def run(
         for body in truth.bodies:
             thrown = read_throws(folder, body, Timing())
             wheels[body] = without_wheel(thrown, masses[body], TRAINING, seed, progress)
-    return Result(plain, extended, studies, errors, wheels, masses, pairs, seconds, perf_counter() - began - seconds)
+    return Result(
+        plain, extended, studies, errors, wheels, masses, miscounted, seconds, perf_counter() - began - seconds
+    )
+
+
+def miscounted_orders(folder: Path, bodies: Sequence[str], count: int | None = None) -> np.ndarray:
+    """Return the order of the loudest line of each throw, (throws,), read with `MISCOUNTED` pole pairs."""
+    timing = Timing(pole_pairs=MISCOUNTED)
+    raws = ([lines_of(raw, timing, ORDERS) for raw in raw_throws(folder, body, count)] for body in bodies)
+    return np.concatenate([loudest_orders(np.abs(lines)) for lines in raws])
 
 
 def covered_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
@@ -258,7 +267,7 @@ def _body_rows(result: Result) -> Iterator[Row]:
         numbers = (torque.sd, torque.ratio, force.sd, *result.extended.noise[name], residual.wheel[1], order)
         felt = (there[axis], beside[axis], result.masses[name] * there[axis])
         yield (
-            *(name, len(residual.names), *map(_digits, numbers), following(residual, result.pairs)),
+            *(name, len(residual.names), *map(_digits, numbers), following(residual)),
             *(CHANNELS[axis][-1], *map(_digits, felt)),
         )
 
@@ -473,7 +482,7 @@ def _dropped(result: Result, body: str) -> str:
 
 def _residual_section(document: Document, result: Result) -> None:
     document.section("Unexplained residual")
-    document.items(shaking_words(result.extended.left, result.pairs))
+    document.items(shaking_words(result.extended.left))
     document.figure(
         residual_figure(result.extended.left),
         "Residual, mean over throws. Left: amplitude of the residual of the samples; the bands mark the frequency of "

@@ -1,13 +1,8 @@
 """What the extended model leaves of the samples, and whether the raw counts beneath them shake with the wheel.
 
-Samples tell when, on which axis and at which frequency below 100 Hz the residual sits. Whether it follows the wheel is
-asked of the raw counts, whose 4 kHz hold every turn: while the wheel coasts at speed they are projected on harmonics of
-its angle, the integral of its recorded speed (order tracking). An unbalanced wheel gives a peak at the order of its
-turns, a force that grows with the square of the speed and a rate that grows with the speed itself.
-
-The recorded speed counts electrical periods and takes the number of pole pairs from the source of the data. The order
-of the turns says how many there are: where the loudest line of the calibration throws is at 6/7 of the recorded speed,
-a motor that was taken to have six pairs of poles has seven.
+Samples tell when, on which axis and at which frequency below 50 Hz the residual sits. Whether it follows the wheel is
+asked of the raw counts, whose 4 kHz hold every turn (`studies.throws.rotor`). An unbalanced wheel gives a peak at the
+order of its turns, a force that grows with the square of the speed and a rate that grows with the speed itself.
 """
 
 from __future__ import annotations
@@ -18,27 +13,22 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 
-from bayesid import Recording, SensorKind
+from bayesid import SensorKind
 from bayesid._math.arrays import Floats
-from studies.throws.data import CALIBRATION, INTERVAL, POLE_PAIRS, SMOOTH, WHEEL_INERTIA, Timing, read_raw
+from studies.throws.data import INTERVAL, SMOOTH, WHEEL_INERTIA
 from studies.throws.joint import Throw
+from studies.throws.raw import RawThrow, Timing
+from studies.throws.rotor import FAST, ORDERS, TURN, lines_of, loudest_orders, near
 
 CHANNELS = ("gyro x", "gyro y", "gyro z", "accel. x", "accel. y", "accel. z")
-
-ORDERS = np.arange(0.4, 3.601, 0.02)  # frequencies relative to the wheel's as it is recorded
-TURN = 1.5  # order below which the wheel's own turn is looked for
 
 # phases of a flight, by the wheel's speed and its slope
 PHASES = ("idle before", "running up", "fast", "running down", "idle after")
 
-FAST, IDLE = 0.8, 0.3  # share of a throw's highest wheel speed above which it is fast, and below which it idles
+IDLE = 0.3  # share of a throw's highest wheel speed below which it idles
 
-# relative change of the wheel's speed in a second, up to which it coasts [1/s]: an eighth in the whole of it
-STEADY = 1.5
-
-BINS = np.fft.rfftfreq(96, INTERVAL)
+BINS = np.fft.rfftfreq(45, INTERVAL)
 
 
 @dataclass(frozen=True)
@@ -71,10 +61,6 @@ class Residual:
         high = BINS > 10.0
         return float(BINS[high][np.argmax(self.spectrum[high, channel])])
 
-    def peaks(self, channel: int) -> Floats:
-        """Return the order below 1.5 at which each throw's raw readings are loudest, shape (throws,)."""
-        return ORDERS[ORDERS < TURN][np.argmax(self.orders[:, ORDERS < TURN, channel], axis=1)]
-
     @property
     def turn(self) -> tuple[float, Floats, Floats]:
         """Order of the loudest line, its amplitudes over throws, (6,), and those half an order beside it, (6,).
@@ -89,12 +75,6 @@ def _turn(orders: Floats) -> tuple[float, Floats, Floats]:
     place = int(np.argmax(mean[ORDERS < TURN, 3:].max(axis=1)))
     beside = np.argmin(np.abs(ORDERS - ORDERS[place] - 0.5))
     return float(ORDERS[place]), mean[place], mean[beside]
-
-
-def pole_pairs(left: Sequence[Residual]) -> int:
-    """Return the number of pole pairs that the loudest line of some bodies says, were it the wheel's own turn."""
-    peaks = [residual.peaks(3 + int(np.argmax(residual.turn[1][3:]))) for residual in left]
-    return round(POLE_PAIRS / float(np.median(np.concatenate(peaks))))
 
 
 def residual_of(throws: Sequence[Throw], folder: Path) -> Residual:
@@ -112,7 +92,8 @@ def residual_of(throws: Sequence[Throw], folder: Path) -> Residual:
         squares.append([(where == k).sum() for k in range(len(PHASES))])
         spectra.append(_amplitudes(time, residual))
         wheels.append([speed[where == 0].mean(), top, speed[where == 4].mean()])
-        orders.append(orders_of(recording, folder))
+        raw = RawThrow.read(folder / "throws" / f"{recording.name}.csv")
+        orders.append(np.abs(lines_of(raw, Timing(), ORDERS)))
     total, count = np.sum(phases, axis=0), np.sum(squares, axis=0)[:, None]
     quiet = np.concatenate(
         [sensor.noise.sigma(INTERVAL) for sensor in throws[0].posterior.model.sensors if sensor.kind.mounted]
@@ -130,10 +111,7 @@ def residual_of(throws: Sequence[Throw], folder: Path) -> Residual:
 
 
 def _shaken(orders: Floats, runs: Sequence[tuple[Floats, NDArray[np.intp]]]) -> Floats:
-    """Root mean square of what the turn leaves in the samples by phase, (5, 6), its amplitude that of fast stretches.
-
-    The filter of the samples passes a part of what turns at a speed; faster turns alias, and count all the same.
-    """
+    """Root mean square of what the turn leaves in the samples by phase, (5, 6), with its fast amplitude."""
     order, amplitude, _ = _turn(orders)
     power = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     square, count = np.zeros((len(PHASES), 6)), np.zeros((len(PHASES), 1))
@@ -173,64 +151,27 @@ def _amplitudes(time: Floats, residual: Floats) -> Floats:
     return np.array(amplitudes)
 
 
-def orders_of(recording: Recording, folder: Path) -> Floats:
-    """Return amplitudes of the raw readings of a throw at `ORDERS` while the wheel coasts at speed: (orders, 6)."""
-    wheel_time, momentum = recording.vector("wheel_momentum")
-    clock, readings, _ = read_raw(folder / "throws" / f"{recording.name}.csv")
-    turning = np.abs(momentum[:, 2]) / WHEEL_INERTIA
-    angle = cumulative_trapezoid(turning, wheel_time, initial=0)
-    slope = np.abs(np.gradient(turning, wheel_time))
-    coasting = wheel_time[(turning > FAST * turning.max()) & (slope < STEADY * turning)] + Timing().start
-    rows = (clock > coasting[0]) & (clock < coasting[-1])
-    smooth = np.vander(np.linspace(-1.0, 1.0, rows.sum()), 4)
-    left = readings[rows] - smooth @ np.linalg.lstsq(smooth, readings[rows], rcond=None)[0]
-    weight = np.hanning(rows.sum())
-    turn = np.interp(clock[rows] - Timing().start, wheel_time, angle)
-    return np.abs(np.exp(-1j * ORDERS[:, None] * turn) * (2.0 * weight / weight.sum()) @ left)
-
-
-# distance from the expected order within which a throw's loudest line counts as the wheel's turn; the wheel coasts for
-# some 0.09 s, which tells orders 0.05 apart
-NEAR = 0.03
-
-
 def shaken_axis(left: Residual) -> int:
     """Return the channel of the accelerometer that the wheel shakes most."""
     return 3 + int(np.argmax(left.turn[1][3:]))
 
 
-def following(left: Residual, pairs: int) -> int:
-    """Return in how many throws the loudest line below order 1.5 is the turn of a wheel with some pairs of poles."""
-    return int((np.abs(left.peaks(shaken_axis(left)) - POLE_PAIRS / pairs) < NEAR).sum())
+def following(left: Residual) -> int:
+    """Return in how many throws the loudest line below order 1.5 is the turn of the wheel."""
+    return near(loudest_orders(left.orders), 1.0)
 
 
-def shaking_words(left: Mapping[str, Residual], pairs: int) -> list[str]:
-    """Return sentences on what shakes the device and when, for bodies of the calibration and others."""
+def shaking_words(left: Mapping[str, Residual]) -> list[str]:
+    """Return sentences on what shakes the device and when."""
     axes = {body: shaken_axis(residual) for body, residual in left.items()}
-    known = [residual for body, residual in left.items() if body in CALIBRATION]
-    others = [residual for body, residual in left.items() if body not in CALIBRATION]
-    counts = [
-        f"{sum(following(residual, pairs) for residual in of)} of {sum(len(residual.names) for residual in of)}"
-        for of in (known, others)
-    ]
+    count, total = sum(map(following, left.values())), sum(len(residual.names) for residual in left.values())
     running = [residual.shaken[1, axes[body]] / residual.phase[1, axes[body]] for body, residual in left.items()]
     loudest = [PHASES[int(np.nanargmax(residual.phase[:, axes[body]]))] for body, residual in left.items()]
     most = max(set(loudest), key=loudest.count)
-    shaken = (
-        f"The wheel shakes the device: the strongest line of the raw accelerometer is at {POLE_PAIRS}/{pairs} of the "
-        f"recorded wheel's frequency, a ratio from the calibration throws ({counts[0]}) that is confirmed by "
-        f"{counts[1]} throws of the bodies"
-    )
-    if pairs != POLE_PAIRS:
-        shaken += (
-            f". The motor appears to have {pairs} pole pairs instead of the {POLE_PAIRS} stated by the source of the "
-            "data; the wheel would then turn more slowly than recorded. The inertias of the bodies do not change, "
-            "since the known box calibrates the wheel's momentum; its inertia would be larger by the same factor"
-        )
     return [
-        f"{shaken}.",
-        f"The residual is largest while the wheel is {most} on {loudest.count(most)} of {len(left)} bodies, where it "
-        "passes through the frequencies that samples every 5 ms transmit. An imbalance of the observed size would give "
-        f"{min(running):.1f} to {max(running):.1f} times that residual. Its force differs between bodies, unlike that "
-        "of a single static imbalance.",
+        "The wheel shakes the device: the strongest line of the raw accelerometer is at the frequency of the wheel in "
+        f"{count} of {total} throws.",
+        f"The residual is largest while the wheel is {most} on {loudest.count(most)} of {len(left)} bodies. An "
+        f"imbalance of the observed size would give {min(running):.1f} to {max(running):.1f} times the residual of the "
+        "samples while the wheel is running up.",
     ]
