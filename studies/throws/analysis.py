@@ -13,8 +13,8 @@ from bayesid import Posterior
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import WHEEL_INERTIA, Truth, read_throws, regress
-from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, maximise_jointly, width_of
-from studies.throws.model import STEP, extended, is_calibration, is_local, manoeuvres
+from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, losses, maximise_jointly, width_of
+from studies.throws.model import NAMED, STEP, Unexplained, extended, is_calibration, is_local, manoeuvres
 from studies.throws.raw import Timing
 from studies.throws.residual import Residual, residual_of
 
@@ -128,14 +128,14 @@ class BodyResult:
         freedom = len(self.throws) / (len(self.throws) - 1.0)
         return float(np.sqrt(freedom * (((self.moments - self.moments.mean(axis=0)) / self.formal) ** 2).mean()))
 
-    def covered(self, level: float, *, with_truth: bool = False) -> tuple[int, int]:
-        """Return how many intervals of single throws hold the truth at a level, and of how many.
+    def covered(self, level: float, *, about: Floats | None = None, with_truth: bool = False) -> tuple[int, int]:
+        """Return how many intervals of single throws hold the truth at a level, or other moments, and of how many.
 
         With ``with_truth`` the interval counts what all throws share as well: the truth's own uncertainty, and that of
         the wheel and the device, for which the jackknife of the joint answer stands.
         """
         sd = np.sqrt(self.formal**2 + (self.truth_sd**2 + self.joint_jackknife**2 if with_truth else 0.0))
-        inside = np.abs(self.moments - self.truth) < norm.ppf(0.5 + 0.5 * level) * sd
+        inside = np.abs(self.moments - (self.truth if about is None else about)) < norm.ppf(0.5 + 0.5 * level) * sd
         return int(inside.sum()), inside.size
 
     @property
@@ -162,8 +162,20 @@ class Analysis:
     noise: Mapping[str, Floats]  # noise of gyro and accelerometer relative to that of quiet stretches
     # unknowns of the device, in standard deviations of their priors times those: physical units
     calibration: Mapping[str, tuple[float, float]]
+    # by effect and body, (throws,): by how much worse throws are predicted from the others without the effect [nats]
+    losses: Mapping[str, Mapping[str, Floats]]
     left: Mapping[str, Residual]  # what the model leaves, by body; empty for a rigid model
     converged: bool
+
+    def confirmed(self, effect: str, body: str) -> bool:
+        """Whether throws of a body are predicted worse without an effect, by two standard errors over its throws."""
+        loss = self.losses[effect][body]
+        return bool(loss.mean() > 2.0 * loss.std(ddof=1) / np.sqrt(len(loss)))
+
+    def unexplained(self, body: str) -> Unexplained:
+        """Return what all throws of a body say of the unexplained torque and force in each, and of the noise."""
+        widths = self.widths[body]
+        return Unexplained(widths["smooth-torque"].sd, widths["smooth-force"].sd, self.noise[body])
 
 
 def prepare(folder: Path, truth: Truth, count: int | None) -> list[Throw]:
@@ -232,9 +244,16 @@ def analyse(
         widths={b: {e: width_of(joint, b, e) for e in SMOOTH} for b in truth.bodies} if smooth else {},
         noise={throw.body: throw.noise for throw in joint.throws},
         calibration=_calibration(joint, throws[0].posterior),
+        losses=_losses(joint, free) if smooth else {},
         left={b: residual_of([t for t in joint.throws if t.body == b], folder) for b in truth.bodies} if smooth else {},
         converged=joint.converged,
     )
+
+
+def _losses(joint: Joint, free: Callable[[str], bool]) -> dict[str, dict[str, Floats]]:
+    bodies = np.array([throw.body for throw in joint.throws])
+    each = {effect: losses(joint, effect, free) for effect in NAMED}
+    return {effect: {body: loss[bodies == body] for body in dict.fromkeys(bodies)} for effect, loss in each.items()}
 
 
 def _bodies(

@@ -72,6 +72,7 @@ class Joint:
     information: Floats  # (throws, n, n)
     pull: Floats  # (throws, n): each throw's own part of the normal equations at the mode, its own unknowns eliminated
     local_variance: tuple[Floats, ...]  # of each throw's free own unknowns, in the order of its posterior
+    evidence: Floats  # (throws,): log density at the mode, each throw's own unknowns marginalised, up to its noise's
     fitted: Floats  # (throws, 6): number of samples of each axis that the throw's own unknowns absorb
     local: tuple[NDArray[np.intp], ...]  # which unknowns of each throw these are
     converged: bool
@@ -85,6 +86,19 @@ class Joint:
         """Shared unknowns, shape (n,), had one throw not been made, to first order."""
         precision = np.linalg.inv(self.covariance) - self.information[index]
         return self.value + np.linalg.solve(precision, self.pull[index])
+
+    def left_out_scores(self) -> Floats:
+        """Return the log density of each throw given the others, (throws,) [nats], to second order about the mode.
+
+        A constant of each throw's noise is left out, which models that share the noise have in common.
+        """
+        hessian = np.linalg.inv(self.covariance)
+        scores = []
+        for information, pull, evidence in zip(self.information, self.pull, self.evidence, strict=True):
+            others = hessian - information
+            narrowed = np.linalg.slogdet(hessian)[1] - np.linalg.slogdet(others)[1]
+            scores.append(evidence - 0.5 * (narrowed + pull @ np.linalg.solve(others, pull)))
+        return np.array(scores)
 
     def body_coordinates(self, body: str, values: Floats) -> Floats:
         """Log-Cholesky coordinates of one body among shared unknowns (m, n): shape (m, 10)."""
@@ -183,6 +197,7 @@ def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_f
         information=information,
         pull=pull,
         local_variance=tuple(variance),
+        evidence=np.array([block.evidence for block in blocks]),
         fitted=np.stack([block.fitted for block in blocks]),
         local=tuple(system.local),
         converged=converged,
@@ -197,6 +212,7 @@ class _Block(NamedTuple):
     local_step: Floats
     local_response: Floats
     local_variance: Floats
+    evidence: float
     fitted: Floats
 
 
@@ -210,7 +226,23 @@ def _eliminate(throw: Throw, z: Floats, local: NDArray[np.intp], columns: NDArra
     variance = (np.linalg.inv(factor) ** 2).sum(axis=0)
     pull = a.T @ residual - mixed.T @ pulled
     fitted = (np.linalg.solve(factor, b.T) ** 2).sum(axis=0).reshape(-1, 6).sum(axis=0)
-    return _Block(a.T @ a - mixed.T @ mixed, pull, -back[:, -1], -back[:, :-1], variance, fitted)
+    cost = float(residual @ residual + z[local] @ (precision * z[local]))
+    evidence = -0.5 * cost - float(np.log(np.diag(factor)).sum()) + 0.5 * float(np.log(precision).sum())
+    return _Block(a.T @ a - mixed.T @ mixed, pull, -back[:, -1], -back[:, :-1], variance, evidence, fitted)
+
+
+def losses(joint: Joint, effect: str, free: Callable[[str], bool]) -> Floats:
+    """Return by how much worse each throw is predicted from the others without an effect, (throws,) [nats].
+
+    Parameters
+    ----------
+    joint : Joint; of the model with the effect
+    effect : str; its label
+    free : callable; which unknowns were fitted
+    """
+    without = [replace(throw, z=np.where(_named(throw, effect), 0.0, throw.z)) for throw in joint.throws]
+    dropped = maximise_jointly(without, lambda name: free(name) and not name.rpartition(":")[2].startswith(effect))
+    return joint.left_out_scores() - dropped.left_out_scores()
 
 
 SMOOTH = ("smooth-torque", "smooth-force")

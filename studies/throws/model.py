@@ -6,6 +6,7 @@ All sizes are those of a small flight controller with one reaction wheel along z
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -28,7 +29,7 @@ from bayesid import (
 from bayesid._math.arrays import Floats
 from bayesid.simulation.effects import Effect, Instant, Parameter, Readings, SensorBias, Situation, Wrench
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
-from studies.throws.data import SMOOTH, WHEEL_INERTIA, quiet_noise
+from studies.throws.data import INTERVAL, SMOOTH, WHEEL_INERTIA, quiet_noise
 from studies.throws.raw import Timing
 
 STEP = 0.0025  # longest integration step [s], half of the interval between samples
@@ -256,13 +257,39 @@ def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Record
     return Model(robot, sensors, (BodyPrior("base_link", centre, spread),), effects=(ThrowBias(BIAS),), rate_sigma=RATE)
 
 
+NAMED = ("gyro-cross", "wheel-tilt", "wheel-delay", "air-drag", "wheel-imbalance")  # effects of the extended model
+
+
 def extended(centre: InertialParameters, recordings: Sequence[Recording], duration: float) -> Model:
     """Return the same with the device's errors, drag and unexplained torque, and a body that is hardly known."""
     model = rigid(centre, 1.0, recordings)
     smooth = SmoothTorque(duration, KNOTS, TORQUE), SmoothForce(duration, KNOTS, BIAS)
-    for effect in (GyroCross(), WheelTilt(), WheelDelay(), AirDrag(DRAG), *smooth):
+    for effect in (GyroCross(), WheelTilt(), WheelDelay(), AirDrag(DRAG), WheelImbalance(), *smooth):
         model = model.extend(effect)
     return model
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What the throws of a body contain beside every cause, by marginal likelihood over all of them."""
+
+    torque: float  # standard deviation of the unexplained torque at its knots [N m]
+    force: float  # that of the unexplained specific force [m/s2]
+    noise: Floats  # (6,): noise of gyro and accelerometer relative to that of quiet stretches
+
+
+def with_unexplained(model: Model, unexplained: Unexplained, duration: float) -> Model:
+    """Return a model with an unexplained torque and force in every throw and the noise of the flight."""
+    rate, accel = (
+        replace(sensor, noise=_white(sensor.noise.sigma(INTERVAL) * factor))
+        for sensor, factor in zip(model.sensors, unexplained.noise.reshape(2, 3), strict=True)
+    )
+    for effect in (
+        SmoothTorque(duration, KNOTS, unexplained.torque),
+        SmoothForce(duration, KNOTS, unexplained.force),
+    ):
+        model = model.extend(effect)
+    return replace(model, sensors=(rate, accel))
 
 
 def manoeuvres(model: Model, recordings: Sequence[Recording]) -> list[Manoeuvre]:

@@ -10,6 +10,7 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis
@@ -19,13 +20,13 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
 from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
-from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
 from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult, analyse, prepare
 from studies.throws.data import DEFAULT_FOLDER, EXCLUDED, INTERVAL, raw_throws, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, Lacking, geometry_errors, lacking, without_wheel
 from studies.throws.joint import LARGEST
-from studies.throws.model import is_fitted, is_rigid
-from studies.throws.raw import Timing
+from studies.throws.model import KNOTS, is_fitted, is_rigid
+from studies.throws.raw import POLE_PAIRS, Timing
 from studies.throws.residual import (
     CHANNELS,
     PHASES,
@@ -34,11 +35,12 @@ from studies.throws.residual import (
     shaken_axis,
     shaking_words,
 )
-from studies.throws.rotor import ORDERS, lines_of, loudest_orders
+from studies.throws.rotor import ORDERS, lines_of, loudest_orders, near, pole_pairs, speed_ratio
 
 MISCOUNTED = 6  # pole pairs of the motor as the source of the data first stated them
 QUICK = 4  # throws of each body that a quick run identifies
-TRAINING = 1  # throws of each body that are diagnosed
+TRAINING = 3  # throws of each body that are diagnosed together
+DROPPED = 1  # throws of each body that are diagnosed without their recorded wheel
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}  # mean errors of a quick least-squares fit by those who prepared the data [%]
 LOW, HIGH = 0.90, 0.98  # share of 95 % intervals that should hold the truth
 SECONDS = 600.0  # longest time of a full run [s]
@@ -56,6 +58,7 @@ class Result:
     plain: Analysis
     extended: Analysis
     studies: tuple[Lacking, ...]  # what each body's diagnosis said; empty where it was left out
+    refused: Mapping[str, str]  # why a body was not diagnosed, by body
     errors: Mapping[str, Mapping[str, np.ndarray]]  # of the diagnosed models against the geometry [%]
     wheels: Mapping[str, Diagnosis]  # with the recorded wheel dropped, by body; empty where that was left out
     masses: Mapping[str, float]  # of the bodies with the device on them [kg]
@@ -99,22 +102,34 @@ def run(
     extended = analyse("extended", prepared, is_fitted, truth, rng, folder)
     miscounted = miscounted_orders(folder, truth.bodies, count)
     studies: tuple[Lacking, ...] = ()
+    refused: Mapping[str, str] = {}
     errors: Mapping[str, Mapping[str, np.ndarray]] = {}
     wheels: dict[str, Diagnosis] = {}
     if full:
-        recordings = {body: read_throws(folder, body, Timing()) for body in truth.bodies}
-        studies = tuple(
-            lacking(body, recordings[body], masses[body], TRAINING, seed, progress) for body in truth.bodies
-        )
+        studies, refused = _diagnosed(folder, extended, masses, seed, progress)
         errors = geometry_errors(studies, truth)
     seconds = perf_counter() - began
     if reverse:
         for body in truth.bodies:
-            thrown = read_throws(folder, body, Timing())
-            wheels[body] = without_wheel(thrown, masses[body], TRAINING, seed, progress)
+            thrown, unexplained = read_throws(folder, body, Timing()), extended.unexplained(body)
+            wheels[body] = without_wheel(thrown, masses[body], unexplained, DROPPED, seed, progress)
     return Result(
-        plain, extended, studies, errors, wheels, masses, miscounted, seconds, perf_counter() - began - seconds
+        plain, extended, studies, refused, errors, wheels, masses, miscounted, seconds, perf_counter() - began - seconds
     )
+
+
+def _diagnosed(
+    folder: Path, extended: Analysis, masses: Mapping[str, float], seed: int, progress: Progress
+) -> tuple[tuple[Lacking, ...], dict[str, str]]:
+    """Return the diagnoses of all bodies, and why a body was refused, which does not end the others."""
+    studies, refused = [], {}
+    for body, mass in masses.items():
+        recordings = read_throws(folder, body, Timing())
+        try:
+            studies.append(lacking(body, recordings, mass, extended.unexplained(body), TRAINING, seed, progress))
+        except InputError as error:
+            refused[body] = str(error)
+    return tuple(studies), refused
 
 
 def miscounted_orders(folder: Path, bodies: Sequence[str], count: int | None = None) -> np.ndarray:
@@ -136,38 +151,33 @@ def goals_of(result: Result) -> list[Goal]:
     ratios = [ratio for body in bodies for ratio in body.joint_formal / body.joint_jackknife]
     torques = [widths["smooth-torque"].ratio for widths in result.extended.widths.values()]
     named = [study.body for study in studies if study.diagnosis.verdict.causes]
-    better = [study.body for study in studies if study.held_out.gain.sum() > 0.0]
+    better = [study.body for study in studies if study.gain.sum() > 0.0]
     return [
         *(_quick_fit(body) for body in bodies if body.name in QUICK_FIT),
-        _coverage(result),
+        *(_coverage(body) for body in bodies),
+        _miscounted(result),
         Goal(
             "joint fit: formal over jackknife sd between 0.67 and 1.5 for every moment",
             f"{min(ratios):.2f} to {max(ratios):.2f}",
             Verdict.of(min(ratios) >= 0.67 and max(ratios) <= 1.5),
-            Severity.HIGH,
         ),
         Goal(
             f"unexplained torque at most {LARGEST:g} prior sd on every body",
             f"{max(torques):.2f}",
             Verdict.of(max(torques) <= LARGEST),
-            Severity.MEDIUM,
         ),
-        Goal(
-            "a cause named on every body",
-            *_full(result, f"{len(named)} of {len(studies)}", len(named)),
-            Severity.MEDIUM,
-        ),
+        Goal("a cause named on every body", *_full(result, f"{len(named)} of {len(studies)}", len(named))),
         Goal(
             "extension predicts omitted throws better",
             *_full(result, f"{len(better)} of {len(studies)} bodies", len(better)),
-            Severity.HIGH,
         ),
+        _named(result),
+        _moments_no_worse(result),
         *_reverse(result),
         Goal(
             "whole run within 10 minutes, without the search for the removed wheel",
             f"{result.seconds / 60.0:.1f} minutes",
             Verdict.of(result.seconds <= SECONDS if studies else None),
-            Severity.LOW,
         ),
     ]
 
@@ -177,7 +187,7 @@ def _quick_fit(body: BodyResult) -> Goal:
     goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
     text = f"{body.name}: mean difference of single throws from the stated moments at most {goal:g} %, that of a quick "
     verdict = Verdict.between(mean - 2.0 * error, mean + 2.0 * error, most=goal)
-    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict, Severity.MEDIUM)
+    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict)
 
 
 def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
@@ -187,12 +197,65 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
     return reached, Verdict.of(count == len(result.studies))
 
 
-def _coverage(result: Result) -> Goal:
-    count, total = covered_in_all(result)
+def _coverage(body: BodyResult) -> Goal:
+    """Return the goal on the intervals of one body, whose truth is uncertain by what its throws share."""
+    count, total = body.covered(0.95)
     low, high = Share(count, total).interval
-    text = f"95 % intervals of single throws contain the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
-    reached = f"{100.0 * count / total:.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f} %): {_covered(result)}"
-    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH), Severity.HIGH)
+    percent = f"{100 * LOW:.0f} to {100 * HIGH:.0f} %"
+    text = f"{body.name}: 95 % intervals of single throws contain the stated moments in {percent} of cases"
+    reached = f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
+    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH))
+
+
+def _miscounted(result: Result) -> Goal:
+    """Return the goal on a wrong number of pole pairs, whose ratio to the true one every throw has to say."""
+    timing, orders = Timing(pole_pairs=MISCOUNTED), result.miscounted
+    ratio, count = speed_ratio(orders, timing), near(orders, MISCOUNTED / POLE_PAIRS)
+    return Goal(
+        f"read with {MISCOUNTED} pole pairs instead of {POLE_PAIRS}, every throw shows the wheel at "
+        f"{MISCOUNTED}/{POLE_PAIRS} of the recorded speed",
+        f"{ratio} in {count} of {len(orders)}: {pole_pairs(orders, timing)} pole pairs",
+        Verdict.of(count == len(orders)),
+    )
+
+
+# candidates of the diagnosis that are the effects of the joint fit
+CANDIDATES = {
+    "gyro-cross": "gyro-cross",
+    "wheel-tilt": "wheel-tilt",
+    "air-drag": "rotational-drag",
+    "wheel-imbalance": "wheel-imbalance",
+}
+
+
+def _named(result: Result) -> Goal:
+    """Return the goal on the causes that omitted throws confirm, body by body."""
+    confirmed = [
+        (study, candidate)
+        for study in result.studies
+        for effect, candidate in CANDIDATES.items()
+        if result.extended.confirmed(effect, study.body)
+    ]
+    named = [candidate in study.diagnosis.verdict.causes for study, candidate in confirmed]
+    return Goal(
+        "imbalance, cross-axis terms, tilt and drag are named on each body whose omitted throws confirm them",
+        f"{sum(named)} of {len(named)}" if result.studies else "not run",
+        Verdict.of(all(named)) if result.studies else Verdict.NOT_TESTED,
+    )
+
+
+def _moments_no_worse(result: Result) -> Goal:
+    """Return the goal on the moments of the diagnosed throws with the named causes against those of a rigid body."""
+    largest = {
+        body: tuple(float(np.abs(result.errors[model][body]).max()) for model in ("rigid", "extended"))
+        for body in (result.errors["rigid"] if result.errors else {})
+    }
+    return Goal(
+        "largest error of the diagnosed throws' moments is no larger with the named causes than with a rigid body",
+        "; ".join(f"{body} {rigid:.2f} to {extended:.2f} %" for body, (rigid, extended) in largest.items())
+        or "not run",
+        Verdict.of(all(extended <= rigid for rigid, extended in largest.values()) if largest else None),
+    )
 
 
 def _covered(result: Result) -> str:
@@ -210,7 +273,7 @@ def _reverse(result: Result) -> list[Goal]:
         "recorded wheel removed: the verdict names a wheel on every body",
     )
     if not result.wheels:
-        return [Goal(title, "not run", Verdict.NOT_TESTED, Severity.MEDIUM) for title in titles]
+        return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
     diagnoses = list(result.wheels.values())
     probabilities = [wheel_probability(diagnosis) for diagnosis in diagnoses]
     named = [any(cause.startswith("wheel-history") for cause in diagnosis.verdict.causes) for diagnosis in diagnoses]
@@ -219,9 +282,8 @@ def _reverse(result: Result) -> list[Goal]:
             titles[0],
             f"at least {min(probabilities):.3f}",
             Verdict.of(min(probabilities) >= DEFAULT_SETTINGS.named_from),
-            Severity.MEDIUM,
         ),
-        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named)), Severity.MEDIUM),
+        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
     ]
 
 
@@ -347,15 +409,19 @@ def _setup(result: Result) -> Setup:
         manoeuvre="Thrown by hand and caught; the wheel spins up and down in flight. No speed limit applies.",
         sensors=f"Gyro, accelerometer and wheel speed, raw at 4 kHz. Samples every {1e3 * INTERVAL:g} ms are local "
         "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured in quiet "
-        "intervals, by body and axis. Samples next to the largest accelerations of the wheel (12000 rad/s² within 4 "
-        "ms) and the last 20 ms are omitted.",
+        "intervals, by body and axis. Rates next to the largest accelerations of the wheel "
+        f"({Timing().fast:.0f} rad/s² within {1e3 * Timing().margin:g} ms) and the last 20 ms are omitted. A recording "
+        "begins where the angle of the wheel is the same in all throws of a body, which the imbalance shows in the raw "
+        "readings.",
         known=f"Mass, and the stated moments, taken as uncertain by {100 * PLATE_SD:.0f} % for the plate (CAD) and by "
         f"{100 * BLOCK_SD:.1f} % for the contribution of the blocks (our estimates). Inertias are relative to that of "
         "the wheel, which the box calibrates; the device is subtracted with the parallel-axis theorem.",
         unknown="Ten parameters of each body (prior of 100 % about a regression that needs only its mass), cross-axis "
-        "terms of the gyro, tilt and delay of the wheel, drag, and a torque and a specific force per throw that are "
-        f"piecewise linear over 32 ms. In the diagnosis the prior width of the body is {100 * SPREAD:g} % about the "
-        "regression; friction of the wheel axis and noise that depends on acceleration are not candidates.",
+        "terms of the gyro, tilt, delay and imbalance of the wheel, drag, and a torque and a specific force per throw "
+        f"that are piecewise linear over {1e3 * Timing().duration / (KNOTS - 1):.0f} ms. In the diagnosis the prior "
+        f"width of the body is {100 * SPREAD:g} % about the regression, and torque and force are part of the present "
+        "model, with the sizes of the joint fit: a cause has to show what they cannot. Friction of the wheel axis and "
+        "noise that depends on acceleration are not candidates.",
         replicates=f"{sum(throws.values())} throws: {', '.join(f'{name} {count}' for name, count in throws.items())}. "
         f"Omitted: {excluded}.",
     )
@@ -363,23 +429,19 @@ def _setup(result: Result) -> Setup:
 
 def _failures(document: Document, result: Result) -> None:
     document.section("Failures and limits")
-    plain = result.plain.bodies.values()
+    plain, bodies = result.plain.bodies.values(), result.extended.bodies.values()
     both, total = covered_in_all(result, with_truth=True)
     factors = [factor.max() for factor in result.extended.noise.values()]
     unnamed = [study.body for study in result.studies if not study.diagnosis.verdict.causes]
-    texts = []
-    if unnamed:
-        texts.append(
-            f"No cause is named on {', '.join(unnamed)}: the residual of the best catalogue causes is larger than "
-            "noise, and the verdict is unknown."
-        )
+    texts = [f"No cause is named on {', '.join(unnamed)}."] if unnamed else []
+    texts += [f"{body} was not diagnosed: {reason}" for body, reason in result.refused.items()]
     for study in result.studies:
-        if study.body in result.plain.bodies:
+        if all(study.body in errors for errors in result.errors.values()):
             errors = (result.errors[model][study.body] for model in ("rigid", "extended"))
             rigid, extended = (" / ".join(format_signed(value) for value in row) for row in errors)
             texts.append(
-                f"{study.body}, from the one diagnosed throw: the errors of the three moments are {rigid} % with the "
-                f"rigid model and {extended} % with the identified extension."
+                f"{study.body}, from the diagnosed throws: the errors of the three moments are {rigid} % with a rigid "
+                f"body and {extended} % with the unexplained torque and the named causes."
             )
     texts += [
         "With a rigid body and its wheel alone, the stated standard deviations of single throws are "
@@ -391,6 +453,7 @@ def _failures(document: Document, result: Result) -> None:
         "first two are constants in the code that reads the data.",
         "All throws of a body share the error of its stated geometry and of the wheel's inertia. Intervals that "
         f"include both contain {both} of {total} moments.",
+        *map(_shared_error, bodies),
         f"In flight the scatter of the samples about the smooth model is up to {format_fixed(min(factors), 1)} to "
         f"{format_fixed(max(factors), 1)} times that of quiet intervals, depending on the body.",
         "The gyro scale cannot be separated from the wheel's inertia; a displacement of the wheel is not a candidate.",
@@ -399,6 +462,16 @@ def _failures(document: Document, result: Result) -> None:
         if widths["smooth-torque"].doubtful:
             texts.append(f"{body}: the unexplained torque is {widths['smooth-torque'].ratio:.2f} times its prior sd.")
     document.items(texts)
+
+
+def _shared_error(body: BodyResult) -> str:
+    """Return the sentence on what all throws of a body have in common, which their intervals do not include."""
+    errors = " / ".join(format_signed(error, 2) for error in body.joint_errors)
+    inside, total = body.covered(0.95, about=body.joint)
+    return (
+        f"{body.name}: the joint fit of all throws differs from the stated moments by {errors} %; {inside} of {total} "
+        "intervals of single throws contain the joint values instead."
+    )
 
 
 def _bodies(document: Document, result: Result) -> None:
@@ -436,25 +509,34 @@ def _diagnosis(document: Document, result: Result) -> None:
         return
     document.section("Results of the diagnosis")
     document.table(
-        ["body", "verdict", "unknown", "most probable set", "chi-square", "gain", "wheel about z"],
+        ["body", "verdict", "named", "unknown", "most probable set", "gain", "torque", "without wheel"],
         [
             [
                 study.body,
                 study.diagnosis.verdict.status.value,
+                ", ".join(study.diagnosis.verdict.causes) or "nothing",
                 format_probability(study.diagnosis.probabilities.unknown),
                 _likely(study.diagnosis),
-                format_number(study.diagnosis.gain.before.chi2_per_sample),
-                f"{format_number(study.held_out.gain.sum())}, {(study.held_out.gain > 0.0).sum()} of "
-                f"{len(study.held_out.gain)}",
+                f"{format_number(study.gain.sum())}, {(study.gain > 0.0).sum()} of {len(study.gain)}",
+                f"{1e3 * study.unexplained.torque:.2f}",
                 _dropped(result, study.body),
             ]
             for study in result.studies
         ],
-        "The first throw of each body, diagnosed from its data alone: verdict, probability of an unknown cause, most "
-        "probable set of causes, chi-square per sample of the rigid model, and gain of the extension in log score on "
-        "omitted throws, with the number of throws that it predicts better. Last: the same throw without its recorded "
-        "wheel, with the probability of a wheel of unknown time history about the correct axis and the verdict.",
-        columns("lllllll"),
+        f"The first {TRAINING} throws of each body, diagnosed together: verdict, named causes, probability of an "
+        "unknown cause, most probable set of causes, gain of the named causes in log score on throws that are omitted "
+        "one by one, with the number of throws that are predicted better, and root mean square of the unexplained "
+        "torque that remains [mN m], a different one in every throw. Last: one throw without its recorded wheel, with "
+        "the probability of a wheel of unknown time history about the correct axis and the verdict.",
+        columns("llllllrl"),
+    )
+    document.table(
+        ["omitted from the model", *result.masses],
+        [[effect, *(_loss(loss) for loss in by_body.values())] for effect, by_body in result.extended.losses.items()],
+        "By how much worse throws are predicted, each from all others, when an effect is omitted from the joint fit "
+        "[nats], and how many throws are predicted worse. A negative number is an effect that omitted throws "
+        "contradict.",
+        columns("l" + "r" * len(result.masses)),
     )
     if result.wheels:
         minutes = format_number(result.reverse_seconds / 60.0, 2)
@@ -466,6 +548,10 @@ def _diagnosis(document: Document, result: Result) -> None:
             f"the parameters are fixed at the prior and causes are weighed along the measured motion. This took "
             f"{minutes} minutes. The verdict is unknown wherever the residual of the named causes is larger than noise."
         )
+
+
+def _loss(loss: np.ndarray) -> str:
+    return f"{format_signed(loss.sum(), 1)}, {(loss > 0.0).sum()} of {len(loss)}"
 
 
 def _likely(diagnosis: Diagnosis) -> str:
