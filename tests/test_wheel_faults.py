@@ -119,3 +119,5 @@ def test_a_speed_of_a_wrong_number_of_poles_is_named_with_its_ratio(tmp_path):
     assert {"wheel-inertia:wheel1", "wheel-imbalance:wheel1"} <= set(found.verdict.causes)
     rows = {row["name"]: row["amplitude"] for row in found.to_dict()["candidates"]}
     assert rows["wheel-inertia:wheel1"]["factor"]["mean"] == pytest.approx(6.0 / 7.0, abs=1e-3)
+    (imbalance,) = (effect for effect in found.after.fit.effects if effect.label == "wheel-imbalance:wheel1")
+    assert imbalance.order == pytest.approx(6.0 / 7.0, abs=1e-3)

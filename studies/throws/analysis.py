@@ -14,7 +14,16 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import WHEEL_INERTIA, Truth, read_throws, regress
 from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, losses, maximise_jointly, width_of
-from studies.throws.model import NAMED, STEP, Unexplained, extended, is_calibration, is_local, manoeuvres
+from studies.throws.model import (
+    NAMED,
+    STEP,
+    Unexplained,
+    WheelImbalance,
+    extended,
+    is_calibration,
+    is_local,
+    manoeuvres,
+)
 from studies.throws.raw import Timing
 from studies.throws.residual import Residual, residual_of
 
@@ -164,6 +173,7 @@ class Analysis:
     calibration: Mapping[str, tuple[float, float]]
     # by effect and body, (throws,): by how much worse throws are predicted from the others without the effect [nats]
     losses: Mapping[str, Mapping[str, Floats]]
+    imbalance: Mapping[str, tuple[float, float]]  # static, by body, with its standard deviation [kg m]
     left: Mapping[str, Residual]  # what the model leaves, by body; empty for a rigid model
     converged: bool
 
@@ -245,15 +255,30 @@ def analyse(
         noise={throw.body: throw.noise for throw in joint.throws},
         calibration=_calibration(joint, throws[0].posterior),
         losses=_losses(joint, free) if smooth else {},
+        imbalance={body: _imbalance(joint, body) for body in truth.bodies} if smooth else {},
         left={b: residual_of([t for t in joint.throws if t.body == b], folder) for b in truth.bodies} if smooth else {},
         converged=joint.converged,
     )
 
 
 def _losses(joint: Joint, free: Callable[[str], bool]) -> dict[str, dict[str, Floats]]:
-    bodies = np.array([throw.body for throw in joint.throws])
+    bodies = [throw.body for throw in joint.throws]
     each = {effect: losses(joint, effect, free) for effect in NAMED}
-    return {effect: {body: loss[bodies == body] for body in dict.fromkeys(bodies)} for effect, loss in each.items()}
+    return {
+        effect: {body: loss[np.array(bodies) == body] for body in dict.fromkeys(bodies)}
+        for effect, loss in each.items()
+    }
+
+
+def _imbalance(joint: Joint, body: str) -> tuple[float, float]:
+    """Return the static imbalance of the wheel that the throws of one body say, and its standard deviation [kg m]."""
+    rows = [joint.names.index(f"{body}:wheel-imbalance.static.{way}") for way in ("c", "s")]
+    effects = joint.throws[0].posterior.model.effects
+    sigma = next(e.parameters[0].sigma for e in effects if isinstance(e, WheelImbalance))
+    value = joint.value[rows]
+    size = float(np.linalg.norm(value))
+    along = value / size
+    return sigma * size, sigma * float(np.sqrt(along @ joint.covariance[np.ix_(rows, rows)] @ along))
 
 
 def _bodies(

@@ -295,7 +295,15 @@ def wheel_probability(diagnosis: Diagnosis) -> float:
 def _tables(result: Result) -> list[CsvTable]:
     moments = ["model", "throw", "moment", "stated [kg m2]", "identified [kg m2]", "formal sd [kg m2]"]
     bodies = [
-        *("body", "throws", "torque sd [N m]", "rms / sd of the torque", "force sd [m/s2]"),
+        *(
+            "body",
+            "throws",
+            "static imbalance [kg m]",
+            "sd [kg m]",
+            "torque sd [N m]",
+            "rms / sd of the torque",
+            "force sd [m/s2]",
+        ),
         *(f"noise in flight / at rest, {axis}" for axis in AXES),
         *("wheel [Hz]", "strongest order", "throws with it", "axis"),
         *("amplitude [m/s2]", "half an order away [m/s2]", "force [N]"),
@@ -329,7 +337,8 @@ def _body_rows(result: Result) -> Iterator[Row]:
         numbers = (torque.sd, torque.ratio, force.sd, *result.extended.noise[name], residual.wheel[1], order)
         felt = (there[axis], beside[axis], result.masses[name] * there[axis])
         yield (
-            *(name, len(residual.names), *map(_digits, numbers), following(residual)),
+            *(name, len(residual.names), *map(_digits, result.extended.imbalance[name])),
+            *(*map(_digits, numbers), following(residual)),
             *(CHANNELS[axis][-1], *map(_digits, felt)),
         )
 
@@ -376,7 +385,7 @@ def _report(result: Result) -> Report[Result]:
         f"uncertain by {stated}; with a rigid body and its wheel alone the difference is {rigid}. Of the 95 % "
         f"intervals, {_covered(result)} contain the stated moments.{causes}",
         goals=goals_of(result),
-        valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Four "
+        valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Five "
         "choices were made with these throws in view, so this is not a blind test.",
         full=bool(result.studies and result.wheels),
         figure=Picture(
@@ -447,10 +456,10 @@ def _failures(document: Document, result: Result) -> None:
         "With a rigid body and its wheel alone, the stated standard deviations of single throws are "
         f"{' and '.join(f'{body.inflation:.0f} times ({body.name})' for body in plain)} too small, by the scatter of "
         "the throws alone.",
-        "Four choices were made with these throws in view: the delay of the wheel's reading, the wheel acceleration "
-        "beyond which samples are omitted, the smooth force that is fitted together with the torque, and the scaling "
-        "of the noise in flight. The sizes of the last two follow from each body's throws by marginal likelihood; the "
-        "first two are constants in the code that reads the data.",
+        "Five choices were made with these throws in view: the interval of the samples, the delay of the wheel's "
+        "reading, the wheel acceleration beyond which samples are omitted, the smooth force that is fitted together "
+        "with the torque, and the scaling of the noise in flight. The sizes of the last two follow from each body's "
+        "throws by marginal likelihood; the first three are constants in the code that reads the data.",
         "All throws of a body share the error of its stated geometry and of the wheel's inertia. Intervals that "
         f"include both contain {both} of {total} moments.",
         *map(_shared_error, bodies),
@@ -568,7 +577,21 @@ def _dropped(result: Result, body: str) -> str:
 
 def _residual_section(document: Document, result: Result) -> None:
     document.section("Unexplained residual")
-    document.items(shaking_words(result.extended.left))
+    each = joined(
+        f"{format_quantity(1e6 * size, 1e6 * sd)} ({body})" for body, (size, sd) in result.extended.imbalance.items()
+    )
+    document.items(
+        [
+            *shaking_words(result.extended.left),
+            "One imbalance of the wheel for all throws of a body explains the line; only the phase differs between "
+            f"throws. Its static part, found on each body alone, is {each} g mm.",
+            "The unexplained torque differs from throw to throw and is not named: its root mean square is "
+            + joined(
+                f"{1e3 * widths['smooth-torque'].sd:.2f} ({body})" for body, widths in result.extended.widths.items()
+            )
+            + " mN m.",
+        ]
+    )
     document.figure(
         residual_figure(result.extended.left),
         "Residual, mean over throws. Left: amplitude of the residual of the samples; the bands mark the frequency of "
