@@ -79,6 +79,13 @@ def test_the_unexplained_torque_has_the_width_that_its_prior_says(result):
 
 
 @pytest.mark.slow
+def test_throws_left_out_confirm_all_effects_but_a_delay(result):
+    total = {effect: sum(loss.sum() for loss in by_body.values()) for effect, by_body in result.extended.losses.items()}
+    assert total.pop("wheel-delay") < 1.0
+    assert min(total.values()) > 20.0
+
+
+@pytest.mark.slow
 def test_goals_without_a_diagnosis_are_not_tested(result):
     verdicts = {goal.text: goal.verdict for goal in goals_of(result)}
     assert verdicts["a cause named on every body"] is Verdict.NOT_TESTED

@@ -6,10 +6,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from bayesid import Posterior
 from bayesid.diagnosis import Status, diagnose
 from studies.throws.data import SMOOTH, quiet_noise, raw_throws, read_throws, read_truth, regress
 from studies.throws.diagnosis import SPREAD, device_candidates
-from studies.throws.model import extended, manoeuvres, rigid
+from studies.throws.joint import Throw, losses, maximise_jointly
+from studies.throws.model import STEP, extended, is_fitted, manoeuvres, rigid
 from studies.throws.raw import Timing
 from studies.throws.rotor import ORDERS, lines_of, loudest_orders, near, pole_pairs, speed_ratio
 from tests.simulated_throws import ACCEL_NOISE, COM, INERTIA, MASS, RATE_NOISE, write_throws
@@ -81,6 +83,27 @@ def test_a_balanced_wheel_has_no_line(tmp_path):
     (raw,) = raw_throws(tmp_path, "body")
     amplitudes = np.abs(lines_of(raw, Timing(), ORDERS)[:, 3])
     assert amplitudes.max() < 10.0 * np.median(amplitudes)
+
+
+def evidence(joint):
+    """Log evidence of a joint fit by Laplace's approximation, its noise's constant apart."""
+    return joint.evidence.sum() - 0.5 * joint.value @ joint.value + 0.5 * np.linalg.slogdet(joint.covariance)[1]
+
+
+@pytest.mark.slow
+def test_throws_left_out_confirm_drag_and_contradict_a_delay(tmp_path):
+    write_throws(tmp_path, "body", RATES, np.random.default_rng(7), drag=(4e-5, 4e-5, 4e-5))
+    recordings = read_throws(tmp_path, "body", Timing())
+    model = extended(regress(recordings, MASS), recordings, Timing().duration)
+    posteriors = [Posterior.of(model, manoeuvres(model, [recording]), step=STEP) for recording in recordings]
+    throws = [Throw("body", one, one.starting_point(), np.ones(one.size), np.ones(6)) for one in posteriors]
+    joint = maximise_jointly(throws)
+    scores = joint.left_out_scores()
+    for index, score in enumerate(scores):
+        others = maximise_jointly([throw for i, throw in enumerate(joint.throws) if i != index])
+        assert score == pytest.approx(evidence(joint) - evidence(others), abs=0.5)
+    assert losses(joint, "air-drag", is_fitted).sum() > 5.0
+    assert losses(joint, "wheel-delay", is_fitted).sum() < 2.0
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ from studies.throws.rotor import ORDERS, lines_of, loudest_orders, near, pole_pa
 
 MISCOUNTED = 6  # pole pairs of the motor as the source of the data first stated them
 QUICK = 4  # throws of each body that a quick run identifies
-TRAINING = 3  # throws of each body that are diagnosed together
+TRAINING = 5  # throws of each body that are diagnosed together
 DROPPED = 1  # throws of each body that are diagnosed without their recorded wheel
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}  # mean errors of a quick least-squares fit by those who prepared the data [%]
 LOW, HIGH = 0.90, 0.98  # share of 95 % intervals that should hold the truth
@@ -212,7 +212,7 @@ def _miscounted(result: Result) -> Goal:
     timing, orders = Timing(pole_pairs=MISCOUNTED), result.miscounted
     ratio, count = speed_ratio(orders, timing), near(orders, MISCOUNTED / POLE_PAIRS)
     return Goal(
-        f"read with {MISCOUNTED} pole pairs instead of {POLE_PAIRS}, every throw shows the wheel at "
+        f"read with {MISCOUNTED} pole pairs instead of {POLE_PAIRS}, the wheel turns in every throw at "
         f"{MISCOUNTED}/{POLE_PAIRS} of the recorded speed",
         f"{ratio} in {count} of {len(orders)}: {pole_pairs(orders, timing)} pole pairs",
         Verdict.of(count == len(orders)),
@@ -420,8 +420,8 @@ def _setup(result: Result) -> Setup:
         "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured in quiet "
         "intervals, by body and axis. Rates next to the largest accelerations of the wheel "
         f"({Timing().fast:.0f} rad/s² within {1e3 * Timing().margin:g} ms) and the last 20 ms are omitted. A recording "
-        "begins where the angle of the wheel is the same in all throws of a body, which the imbalance shows in the raw "
-        "readings.",
+        "begins at the same angle of the wheel in all throws of a body, which follows from the line of its imbalance "
+        "in the raw readings.",
         known=f"Mass, and the stated moments, taken as uncertain by {100 * PLATE_SD:.0f} % for the plate (CAD) and by "
         f"{100 * BLOCK_SD:.1f} % for the contribution of the blocks (our estimates). Inertias are relative to that of "
         "the wheel, which the box calibrates; the device is subtracted with the parallel-axis theorem.",
@@ -584,7 +584,7 @@ def _residual_section(document: Document, result: Result) -> None:
         [
             *shaking_words(result.extended.left),
             "One imbalance of the wheel for all throws of a body explains the line; only the phase differs between "
-            f"throws. Its static part, found on each body alone, is {each} g mm.",
+            f"throws. Its static part, from each body alone, is {each} g mm.",
             "The unexplained torque differs from throw to throw and is not named: its root mean square is "
             + joined(
                 f"{1e3 * widths['smooth-torque'].sd:.2f} ({body})" for body, widths in result.extended.widths.items()
