@@ -75,9 +75,7 @@ class Lacking:
     @property
     def gain(self) -> Floats:
         """By how much better each throw is predicted from the others with the named causes, (throws,) [nats]."""
-        before, after = (
-            figures and figures.held_out for figures in (self.diagnosis.gain.before, self.diagnosis.gain.after)
-        )
+        before, after = self.diagnosis.gain.before.held_out, self.diagnosis.gain.after.held_out
         return np.zeros(len(self.training)) if before is None or after is None else after - before
 
 
