@@ -552,10 +552,10 @@ def _diagnosis(document: Document, result: Result) -> None:
         unfitted = sum(diagnosis.bodies_fixed for diagnosis in result.wheels.values())
         chi2 = [diagnosis.gain.before.chi2_per_sample for diagnosis in result.wheels.values()]
         document.paragraph(
-            f"Without the recorded wheel, the chi-square per sample of a rigid body is {format_number(min(chi2), 2)} "
-            f"to {format_number(max(chi2), 2)}, and its fit diverges. For {unfitted} of {len(result.wheels)} bodies "
-            f"the parameters are fixed at the prior and causes are weighed along the measured motion. This took "
-            f"{minutes} minutes. The verdict is unknown wherever the residual of the named causes is larger than noise."
+            "Without the recorded wheel, the chi-square per sample of the present model is "
+            f"{format_number(min(chi2), 2)} to {format_number(max(chi2), 2)}. For {unfitted} of {len(result.wheels)} "
+            f"bodies the parameters are fixed at the prior and causes are weighed along the measured motion. This took "
+            f"{minutes} minutes."
         )
 
 
