@@ -14,6 +14,7 @@ from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.inference.mode import fit
 from bayesid.simulation.effects import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from studies.throws.analysis import Tensor, object_moments, tensors, wheel_inertia
 from studies.throws.data import CALIBRATION, Truth, regress
 from studies.throws.model import (
@@ -33,6 +34,9 @@ SPREAD = 0.1  # relative width of the body's prior about a linear regression on 
 
 # an imbalance, cross-axis terms, tilt and drag may all be certain beside something unnamed: this device has them all
 SETTINGS = replace(DEFAULT_SETTINGS, most_beside_unnamed=4)
+
+_SCALE = (PhysicalBound("1", 0.03, "Data sheets of micromechanical sensors state scale factors to 3 % or better."),)
+BOUNDS = {"rate-scale": _SCALE, "accel-scale": _SCALE}
 
 # effects of the catalogue that a stiff body with gyro, accelerometer and one wheel can show in half a second
 CATALOGUE = (
@@ -97,7 +101,9 @@ def lacking(
     plain = rigid(regress(used, mass), SPREAD, recordings)
     model = with_unexplained(plain, unexplained, Timing().duration)
     effects = device_candidates(model, records_wheels=True)
-    diagnosis = diagnose(model, manoeuvres(model, used), seed, effects=effects, settings=SETTINGS, progress=progress)
+    diagnosis = diagnose(
+        model, manoeuvres(model, used), seed, effects=effects, bounds=BOUNDS, settings=SETTINGS, progress=progress
+    )
     posterior = Posterior.of(plain, manoeuvres(plain, used))
     found = {
         "rigid": tensors(posterior, fit(posterior, posterior.starting_point()).z[None, :10]),
@@ -126,7 +132,9 @@ def without_wheel(
         for recording in used
     ]
     effects = device_candidates(model, records_wheels=False)
-    return diagnose(model, manoeuvres(model, bare), seed, effects=effects, settings=SETTINGS, progress=progress)
+    return diagnose(
+        model, manoeuvres(model, bare), seed, effects=effects, bounds=BOUNDS, settings=SETTINGS, progress=progress
+    )
 
 
 def geometry_errors(studies: Sequence[Lacking], truth: Truth) -> dict[str, dict[str, Floats]]:
