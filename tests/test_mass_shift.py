@@ -179,6 +179,16 @@ def test_a_mass_that_moves_elsewhere_turns_the_base_as_the_docstring_says(formul
     np.testing.assert_allclose(2.0 * run.attitude[-1][:3], turned, atol=0.02 * np.abs(turned).max())
 
 
+def test_the_true_rate_after_a_move_does_not_depend_on_when_it_is_read():
+    """A step of the truth across the start or the end of the move gave the base a false kick of 1e-5 rad/s."""
+    path = mj.Mover(mj.Body(MASS, np.array([0.4, 0.1, -0.3]), 1e-3 * np.eye(3)), (1.0, 0.0, 0.0), 0.3, 0.337, 0.1)
+    ends = [
+        mj.TruthModel(SERVICER3, movers=[path]).run(lambda _: (np.zeros(3),) * 3, times, rate0=RATE0).rate[-1]
+        for times in ([0.337, 0.437, 0.6], [0.3312, 0.3377, 0.3991, 0.4353, 0.4409, 0.6])
+    ]
+    np.testing.assert_allclose(*ends, rtol=0.0, atol=1e-9)
+
+
 def test_instants_are_those_of_each_recording(planar_case):
     posterior = planar_case.posterior
     model = posterior.model.extend(MassShift((10.0, np.inf, -1.0)))

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -342,12 +343,22 @@ class TruthModel:
         ends = sorted((time, target))
         return [m.duration / STEPS for m in self.movers if m.start < ends[1] and m.start + m.duration > ends[0]]
 
+    def _legs(self, time: float, target: float) -> list[tuple[float, float]]:
+        """Return the way between two times in legs within which no body sets off or stops in the base.
+
+        A step across such an instant, at which the slope of the acceleration jumps, would give the base a false kick.
+        """
+        first, last = sorted((time, target))
+        edges = {edge for m in self.movers for edge in (m.start, m.start + m.duration) if first < edge < last}
+        return list(pairwise(sorted({time, *edges, target}, reverse=bool(target < time))))
+
     def _march(self, motion: Motion, times: Array, state: Array, step: float) -> list[tuple[Array, ...]]:
         """Read the robot at times that lead away from 0, where it has the given state."""
         time, rows = 0.0, []
         for target in times:
-            for now, size in substeps(time, target, min([step, *self._moves(time, target)])):
-                state = self._step(motion, now, state, size)
+            for begin, end in self._legs(time, target):
+                for now, size in substeps(begin, end, min([step, *self._moves(begin, end)])):
+                    state = self._step(motion, now, state, size)
             time = target
             rows.append(self._read(motion, time, state))
         return rows
