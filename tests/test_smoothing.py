@@ -9,6 +9,8 @@ import pytest
 
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, smooth
+from studies.common import mission
+from studies.truth.recordings import Truth
 
 SIGMA = 1e-5
 
@@ -239,3 +241,17 @@ def test_equal_readings_are_a_joint_at_rest_beside_others_that_move():
     assert np.abs(acceleration).max() < 1e-9
     assert still.jumps == ()
     assert np.abs(moved.evaluate(time)[1] - 0.02 * np.cos(0.2 * time)).max() < 1e-4
+
+
+def test_steps_of_very_different_roughness_do_not_spoil_the_states():
+    """ETS-VII's flight, recorded with one noise of many: repeated solutions with the inexact factor diverge."""
+    rng = np.random.default_rng(np.random.SeedSequence(3, spawn_key=(4,)))
+    mission.true_arm(mission.published_robot(), rng)
+    rng.standard_normal(3)
+    times = mission.sample_times(mission.DURATION, mission.INTERVAL)
+    position, speed, acceleration = map(np.asarray, mission.flight_manoeuvre().evaluate(times))
+    still, level = np.zeros((len(times), 3)), np.tile([0.0, 0.0, 0.0, 1.0], (len(times), 1))
+    truth = Truth(times, position, speed, acceleration, acceleration, still, level, still, still, still)
+    for joint, angle in zip(mission.recorded(truth, rng, bias=np.zeros(3)).motion.joints, position.T, strict=True):
+        assert joint.chi2 < 1.5 * joint.samples
+        assert np.abs(joint.evaluate(times)[0] - angle).max() < 5e-6
