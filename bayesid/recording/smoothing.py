@@ -609,7 +609,8 @@ class _Problem:
         """
         states = np.zeros((self.count, self.order))
         nothing = self._gradient(states, precision, sigmas)
-        gradient, direction, before = nothing, states, (states, 1.0)
+        gradient, direction = nothing, states
+        before: tuple[Floats, float] = (states, 1.0)
         for _ in range(MOST_REFINEMENTS):
             missing = sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(states.shape)
             decrement = float(np.vdot(gradient, missing))

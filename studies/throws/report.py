@@ -20,7 +20,7 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
 from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
-from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
 from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult, analyse, prepare
 from studies.throws.data import DEFAULT_FOLDER, EXCLUDED, INTERVAL, raw_throws, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, Lacking, geometry_errors, lacking, without_wheel
@@ -160,16 +160,23 @@ def goals_of(result: Result) -> list[Goal]:
             "joint fit: formal over jackknife sd between 0.67 and 1.5 for every moment",
             f"{min(ratios):.2f} to {max(ratios):.2f}",
             Verdict.of(min(ratios) >= 0.67 and max(ratios) <= 1.5),
+            Severity.HIGH,
         ),
         Goal(
             f"unexplained torque at most {LARGEST:g} prior sd on every body",
             f"{max(torques):.2f}",
             Verdict.of(max(torques) <= LARGEST),
+            Severity.MEDIUM,
         ),
-        Goal("a cause named on every body", *_full(result, f"{len(named)} of {len(studies)}", len(named))),
+        Goal(
+            "a cause named on every body",
+            *_full(result, f"{len(named)} of {len(studies)}", len(named)),
+            Severity.MEDIUM,
+        ),
         Goal(
             "extension predicts omitted throws better",
             *_full(result, f"{len(better)} of {len(studies)} bodies", len(better)),
+            Severity.HIGH,
         ),
         _named(result),
         _moments_no_worse(result),
@@ -178,6 +185,7 @@ def goals_of(result: Result) -> list[Goal]:
             "whole run within 10 minutes, without the search for the removed wheel",
             f"{result.seconds / 60.0:.1f} minutes",
             Verdict.of(result.seconds <= SECONDS if studies else None),
+            Severity.LOW,
         ),
     ]
 
@@ -187,7 +195,7 @@ def _quick_fit(body: BodyResult) -> Goal:
     goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
     text = f"{body.name}: mean difference of single throws from the stated moments at most {goal:g} %, that of a quick "
     verdict = Verdict.between(mean - 2.0 * error, mean + 2.0 * error, most=goal)
-    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict)
+    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict, Severity.MEDIUM)
 
 
 def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
@@ -204,7 +212,7 @@ def _coverage(body: BodyResult) -> Goal:
     percent = f"{100 * LOW:.0f} to {100 * HIGH:.0f} %"
     text = f"{body.name}: 95 % intervals of single throws contain the stated moments in {percent} of cases"
     reached = f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
-    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH))
+    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH), Severity.HIGH)
 
 
 def _miscounted(result: Result) -> Goal:
@@ -216,6 +224,7 @@ def _miscounted(result: Result) -> Goal:
         f"{MISCOUNTED}/{POLE_PAIRS} of the recorded speed",
         f"{ratio} in {count} of {len(orders)}: {pole_pairs(orders, timing)} pole pairs",
         Verdict.of(count == len(orders)),
+        Severity.HIGH,
     )
 
 
@@ -241,6 +250,7 @@ def _named(result: Result) -> Goal:
         "imbalance, cross-axis terms, tilt and drag are named on each body whose omitted throws confirm them",
         f"{sum(named)} of {len(named)}" if result.studies else "not run",
         Verdict.of(all(named)) if result.studies else Verdict.NOT_TESTED,
+        Severity.MEDIUM,
     )
 
 
@@ -255,6 +265,7 @@ def _moments_no_worse(result: Result) -> Goal:
         "; ".join(f"{body} {rigid:.2f} to {extended:.2f} %" for body, (rigid, extended) in largest.items())
         or "not run",
         Verdict.of(all(extended <= rigid for rigid, extended in largest.values()) if largest else None),
+        Severity.HIGH,
     )
 
 
@@ -273,7 +284,7 @@ def _reverse(result: Result) -> list[Goal]:
         "recorded wheel removed: the verdict names a wheel on every body",
     )
     if not result.wheels:
-        return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
+        return [Goal(title, "not run", Verdict.NOT_TESTED, Severity.MEDIUM) for title in titles]
     diagnoses = list(result.wheels.values())
     probabilities = [wheel_probability(diagnosis) for diagnosis in diagnoses]
     named = [any(cause.startswith("wheel-history") for cause in diagnosis.verdict.causes) for diagnosis in diagnoses]
@@ -282,8 +293,9 @@ def _reverse(result: Result) -> list[Goal]:
             titles[0],
             f"at least {min(probabilities):.3f}",
             Verdict.of(min(probabilities) >= DEFAULT_SETTINGS.named_from),
+            Severity.MEDIUM,
         ),
-        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
+        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named)), Severity.MEDIUM),
     ]
 
 
