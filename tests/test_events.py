@@ -17,7 +17,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Event, Kicks, RateBiasJump, ThermalSnap, ThrusterPulses, create
 from studies.truth import mujoco as mj
 from studies.truth.bodies import SERVICER3
-from studies.truth.hidden_causes import Case
+from studies.truth.hidden_causes import FURTHER_CASES, Case
 from studies.truth.hidden_causes import causes as hide
 from tests.simulated import simulated
 
@@ -158,3 +158,14 @@ def test_causes_that_imitate_each_other_never_part():
     gram = Gram(np.ones((2, 2)), np.zeros(2), {"a": np.array([0]), "b": np.array([1])})
     evidence = SetEvidence(gram, [CandidateCause(name, (AmplitudeGroup(name, 1e3),)) for name in "ab"])
     assert parting_ratio(evidence, "a", "b") == np.inf
+
+
+@pytest.mark.slow
+def test_kicks_are_named_where_their_cosines_are_overrated_beside_another_cause(tmp_path):
+    """One kick in every recording; beside a dipole, six kicks would seem to gain more than all there is."""
+    case = next(case for case in FURTHER_CASES if case.name == "kicks")
+    study = Study.load(case.make(tmp_path, 7700))
+    model = load_model(study)
+    verdict = diagnose(model, load_manoeuvres(study, model.robot), 7700, knows_latitude=True).verdict
+    assert verdict.status is Status.EXPLAINED
+    assert verdict.causes == ("kicks",)

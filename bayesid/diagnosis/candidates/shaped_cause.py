@@ -161,7 +161,8 @@ class ShapedCause(CauseKind):
                 log_others = evidence.log_evidence(causes) if causes else 0.0
                 proposals = self.proposals(point, effect, causes)
                 tuned += [(log_others + proposal.worth, causes, proposal) for proposal in proposals]
-            tuned = [trial for trial in tuned if trial[2].worth > WORTH]
+            worth_it = [trial for trial in tuned if trial[2].worth > WORTH]
+            tuned = _with_exact_gains(point, worth_it)
             if not tuned:
                 continue
             names = [manoeuvre.recording.name for manoeuvre in point.fit.posterior.manoeuvres]
@@ -302,6 +303,25 @@ class ShapedCause(CauseKind):
             sd = float(np.sqrt(weight @ (steps - mean) ** 2 + (wide / POINTS) ** 2 / 12.0))
             numbers_of_shape.append(CauseAmplitude(quantity, float(numbers[place]) + mean, sd))
         return numbers_of_shape
+
+
+def _with_exact_gains(
+    point: Linearisation, trials: Sequence[tuple[float, tuple[str, ...], ShapeProposal]]
+) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
+    """Return proposals with the gains of their own signatures, by which those of different company can be compared.
+
+    The cosines overrate a shape where its company has taken directions that they resolve badly.
+    """
+    exact = []
+    for causes in dict.fromkeys(causes for _, causes, _ in trials):
+        left = Remaining.of(point, causes, point.evidence.forms(causes))
+        beside = [(total, proposal) for total, others, proposal in trials if others == causes]
+        responses = _responses(point.perturbed, point.fit, [proposal.effect for _, proposal in beside])
+        for (total, proposal), columns in zip(beside, responses, strict=True):
+            gram = left.gram(columns, "trial")
+            gain = float(half_chi2(gram.matrix, gram.score))
+            exact.append((total + gain - proposal.gain, causes, replace(proposal, gain=gain)))
+    return exact
 
 
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
