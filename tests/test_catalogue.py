@@ -79,6 +79,7 @@ def test_what_is_hidden_is_said(case, tmp_path):
         assert verdict.status in (Status.EXPLAINED, Status.AMBIGUOUS), said
         assert right(result, case), said
     elif case.status == "unknown" and verdict.causes:
-        assert verdict.causes == case.accept, said
+        # a snap of a few seconds in short recordings at 2 Hz may fit as well as a kick, and both are then reported
+        assert case.accept in (verdict.causes, *verdict.ambiguous_with), said
     else:
         assert verdict.status.value == case.status, said
