@@ -1,15 +1,16 @@
 """Simulation, residual and derivatives of a posterior whose data may be perturbed from outside its model.
 
 Responses to small perturbations follow from the linear time-varying motion about a fit. The state of the composite body
-is small, so that the derivatives of every stage of every integration step fit into a few small matrices. They are
-computed once per fit; a perturbation then costs a few products with them, about a quarter of what it costs to
-differentiate the simulation along it.
+is small, so that the derivatives of every integration step fit into a few small matrices. They are computed once per
+fit; a perturbation then costs a few products with them, a small part of what it costs to differentiate the simulation
+along it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -25,6 +26,7 @@ from bayesid.inference.posterior import COPIES, Posterior
 from bayesid.inference.unknowns import part_of_prior
 from bayesid.robot.composite_tables import WIDTH
 from bayesid.simulation.dynamics import LinearMotion
+from bayesid.simulation.time_grid import Grid
 
 __all__ = ["Arrays", "LinearResponses", "Perturbation", "Traced", "jacobian_of", "perturbed", "residual_of", "trace"]
 
@@ -72,8 +74,11 @@ def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
     return np.moveaxis(np.asarray(slopes), 0, -1)
 
 
-BATCH = 32
-"""Number of perturbations that a processor treats together."""
+BATCH, FEWEST = 32, 8
+"""Largest and smallest number of perturbations that a processor treats together."""
+
+CACHED = 8e6
+"""Memory of what is between perturbations and readings of one recording [bytes], which a processor keeps near."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,8 @@ class LinearResponses:
         Data, which may be `perturbed`.
     motion : LinearMotion
         Derivatives of the simulation there, leading axis R.
+    maps : StepMaps
+        The same by whole steps.
     """
 
     structure: Structure
@@ -98,6 +105,7 @@ class LinearResponses:
     z: Floats
     arrays: Arrays
     motion: LinearMotion
+    maps: StepMaps
 
     @classmethod
     def about(cls, posterior: Posterior, z: Floats, arrays: Arrays) -> LinearResponses:
@@ -112,7 +120,8 @@ class LinearResponses:
             Data, which may be `perturbed`.
         """
         motion = compiled.linearised(posterior.structure, posterior.numbers, on_device(z), arrays)
-        return cls(posterior.structure, posterior.numbers, z, arrays, jax.tree.map(np.asarray, motion))
+        motion = jax.tree.map(np.asarray, motion)
+        return cls(posterior.structure, posterior.numbers, z, arrays, motion, StepMaps.of(motion, arrays.grid))
 
     def part(self, recordings: Sequence[int]) -> LinearResponses:
         """Return the responses of some of the recordings, which are independent given the unknowns.
@@ -124,10 +133,10 @@ class LinearResponses:
         """
         whole, rows = self.structure.layout, np.asarray(recordings)
         layout, coordinates = whole.part(recordings)
-        arrays, motion = jax.tree.map(lambda x: np.asarray(x)[rows], (self.arrays, self.motion))
+        arrays, motion, maps = jax.tree.map(lambda x: np.asarray(x)[rows], (self.arrays, self.motion, self.maps))
         numbers = self.numbers._replace(prior=part_of_prior(whole, self.numbers.prior, recordings))
         structure = replace(self.structure, layout=layout)
-        return LinearResponses(structure, numbers, self.z[coordinates], jax.tree.map(on_device, arrays), motion)
+        return LinearResponses(structure, numbers, self.z[coordinates], jax.tree.map(on_device, arrays), motion, maps)
 
     def along(self, perturbations: Perturbation) -> Floats:
         """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
@@ -135,11 +144,15 @@ class LinearResponses:
 
     def changes(self, perturbations: Perturbation) -> tuple[Floats, Floats]:
         """Return what n stacked perturbations change in the raw readings, (n, R, T, q), and beyond, (n, R, T, C)."""
-        batches = [
-            self._raw(jax.tree.map(lambda x, i=first: x[i : i + BATCH], perturbations))
-            for first in range(0, len(perturbations.reading), BATCH)
-        ]
-        return np.concatenate([np.zeros((0, *self.motion.reading.shape)), *batches]), perturbations.reading
+        count = len(perturbations.reading)
+        raw = np.zeros((count, *self.motion.reading.shape))
+        if any(part.any() for part in perturbations[:4]):  # others are faults of sensors
+            together = int(np.clip(CACHED / (8.0 * self.maps.between), FEWEST, BATCH))
+            for recording in range(raw.shape[1]):
+                for some in (slice(first, first + together) for first in range(0, count, together)):
+                    given = (part[some, recording] for part in perturbations[:4])
+                    raw[some, recording] = self._raw(recording, *given)
+        return raw, perturbations.reading
 
     def whitened(self, raw: Floats, offset: Floats) -> Floats:
         """Return the derivatives of the whitened residual along such changes, shape (n, R, O, C).
@@ -161,64 +174,113 @@ class LinearResponses:
             parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: batch - missing])
         return np.concatenate(parts)
 
-    def _raw(self, perturbations: Perturbation) -> Floats:
-        """Return the derivatives of the raw readings, shape (n, R, T, q)."""
-        if not any(part.any() for part in perturbations[:4]):  # faults of sensors
-            return np.zeros((len(perturbations.reading), *self.motion.reading.shape))
-        grid, motion = self.arrays.grid, self.motion
-        size, samples = np.asarray(grid.step)[..., None, None], np.asarray(grid.step_of)
-        steps = size.shape[1]
-        halves = [slice(time, time + 2 * steps - 1, 2) for time in STAGE_TIMES]
-        forced = [
-            _changed_by(
-                motion.input[:, :, stage], perturbations.node_rows[:, :, half], perturbations.node_wrench[:, :, half]
-            )
-            for stage, half in enumerate(halves)
-        ]
-        slopes, moved = _stages(motion.state, size, forced)
-        carried, turned = _stages(motion.state, size, None)
-        state = _changed_by(motion.initial, perturbations.node_rows[:, :, 0], perturbations.node_wrench[:, :, 0])
-        states = np.empty((steps + 1, *state.shape))
+    def _raw(
+        self, recording: int, node_rows: Floats, sample_rows: Floats, node_wrench: Floats, sample_wrench: Floats
+    ) -> Floats:
+        """Return the derivatives of the raw readings of one recording, shape (n, T, q)."""
+        motion, maps = (jax.tree.map(lambda x: x[recording], each) for each in (self.motion, self.maps))
+        steps, count = maps.carried.shape[:2]
+        forced: Floats = np.zeros((steps, len(node_rows), 3 * count))
+        for place, inputs in enumerate(maps.forced):
+            there = slice(place, place + 2 * steps - 1, 2)
+            _add_changes(forced, inputs, node_rows[:, there], node_wrench[:, there])
+        ends: Floats = np.empty((steps, len(node_rows), 4 * count))  # both states, and what is forced of both slopes
+        ends[..., 2 * count :] = forced[..., count:]
+        state: Floats = np.zeros((len(node_rows), count))
+        _add_changes(state, motion.initial.T, node_rows[:, 0], node_wrench[:, 0])
         for k in range(steps):
-            states[k] = state
-            state = state @ turned[:, k] + moved[:, k]
-        states[steps] = state
-        states = np.moveaxis(states, 0, 1)
-        left, right = states[:, :-1], states[:, 1:]
-        first, last = (size * (slopes[stage] + left @ carried[stage]) for stage in (0, -1))
-        row = np.arange(len(samples))[:, None]
-        fraction = np.asarray(grid.fraction)[..., None, None]
-        there = np.zeros((*samples.shape, *states.shape[2:]))
-        for part, weight in zip((left, right, first, last), hermite_weights(fraction), strict=True):
-            at_samples = part[row, samples]
-            there += np.multiply(at_samples, weight, out=at_samples)
-        readings = there @ np.swapaxes(motion.reading_state, -1, -2)
-        readings += _changed_by(motion.reading_input, perturbations.sample_rows, perturbations.sample_wrench)
-        return np.moveaxis(readings, -2, 0)
+            ends[k, :, :count] = state
+            state = state @ maps.carried[k] + forced[k, :, :count]
+            ends[k, :, count : 2 * count] = state
+        readings = ends[np.asarray(self.arrays.grid.step_of)[recording]] @ maps.readings
+        _add_changes(readings, np.swapaxes(motion.reading_input, -1, -2), sample_rows, sample_wrench)
+        return np.swapaxes(readings, 0, 1)
 
 
-def _changed_by(derivatives: Floats, rows: Floats, wrench: Floats) -> Floats:
-    """Return what perturbations (n, ..., 28) and (n, ..., 6) change by derivatives (..., m, 34), (..., n, m)."""
-    turned = np.swapaxes(derivatives, -1, -2)
-    changed: Floats = np.zeros((*rows.shape[1:-1], len(rows), turned.shape[-1]))
-    for part, slopes in ((rows, turned[..., :WIDTH, :]), (wrench, turned[..., WIDTH:, :])):
-        if part.any():  # most perturbations have one of them
-            changed += np.moveaxis(part, 0, -2) @ slopes
-    return changed
+class StepMaps(NamedTuple):
+    """What the inputs and the state at the ends of a step do, with all stages of the step eliminated.
 
+    Perturbations are rows here, so that they are multiplied from the right.
 
-def _stages(state: Floats, size: Floats, forced: list[Floats] | None) -> tuple[list[Floats], Floats]:
-    """Return the slopes at the stages of each step, and the state at its end: (R, K, n, states), rows of states.
-
-    They are those of forced slopes that start from zero, or without these of each unit state at the beginning.
+    Attributes
+    ----------
+    carried : (R, K, n, n) array
+        From the state at the beginning of each step to that at its end.
+    forced : tuple of three (R, K, 34, 3 n) arrays
+        From the inputs at the beginning, middle and end of each step to the state at its end, and to the slopes at both
+        ends, times the length of the step, where the state at the beginning is zero.
+    readings : (R, T, 4 n, q) array
+        From both states of the step of each sample, and what is forced of both slopes, to the raw readings.
     """
-    turned = np.swapaxes(state, -1, -2)
-    count = state.shape[-1]
-    here = start = np.eye(count) if forced is None else np.zeros((1, count))
+
+    carried: Floats
+    forced: tuple[Floats, Floats, Floats]
+    readings: Floats
+
+    @property
+    def between(self) -> int:
+        """Size of all that is computed between one perturbation of a recording and its readings."""
+        _, steps, _, inputs_of_ends = self.forced[0].shape
+        _, samples, ends, _ = self.readings.shape
+        return steps * (inputs_of_ends + ends) + samples * ends
+
+    @classmethod
+    def of(cls, motion: LinearMotion, grid: Grid) -> StepMaps:
+        """Eliminate the stages.
+
+        Parameters
+        ----------
+        motion : LinearMotion
+            Leading axis R.
+        grid : Grid
+        """
+        size, samples = np.asarray(grid.step)[..., None, None], np.asarray(grid.step_of)
+        state, inputs = np.swapaxes(motion.state, -1, -2), np.swapaxes(motion.input, -1, -2)
+        count = state.shape[-1]
+        first, last, carried = _stages(state, size, np.eye(count), [np.zeros((1, 1))] * len(TABLEAU))
+        forced = []
+        for place in range(3):
+            acting = [
+                inputs[:, :, stage] if time == place else np.zeros((1, 1)) for stage, time in enumerate(STAGE_TIMES)
+            ]
+            slopes = _stages(state, size, np.zeros((1, count)), acting)
+            whole = np.zeros((*inputs.shape[:2], inputs.shape[-2], 3 * count))
+            for part, value in enumerate((slopes[2], size * slopes[0], size * slopes[1])):
+                whole[..., part * count : (part + 1) * count] = value
+            forced.append(whole)
+        weights = hermite_weights(np.asarray(grid.fraction)[..., None, None])
+        row = np.arange(len(samples))[:, None]
+        left = weights[0] * np.eye(count) + weights[2] * (size * first)[row, samples]
+        left = left + weights[3] * (size * last)[row, samples]
+        ends = (left, *(weight * np.eye(count) for weight in weights[1:]))
+        read = np.swapaxes(motion.reading_state, -1, -2)
+        return cls(carried, (forced[0], forced[1], forced[2]), np.concatenate([end @ read for end in ends], axis=-2))
+
+
+def _add_changes(changes: Floats, derivatives: Floats, rows: Floats, wrench: Floats) -> None:
+    """Add what perturbations (n, ..., 28) and (n, ..., 6) change by derivatives (..., 34, m), to (..., n, m)."""
+    for part, slopes in ((rows, derivatives[..., :WIDTH, :]), (wrench, derivatives[..., WIDTH:, :])):
+        if part.any():  # most perturbations have one of them
+            changes += np.moveaxis(part, 0, -2) @ slopes
+
+
+def _stages(state: Floats, size: Floats, start: Floats, acting: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
+    """Return the slopes at the first and last stage of each step, and the state at its end, rows of states.
+
+    Parameters
+    ----------
+    state : (R, K, 5, n, n) array
+        From the state at each stage to the slope there.
+    size : (R, K, 1, 1) array
+    start : (m, n) array
+        State at the beginning of each step.
+    acting : sequence of five (..., m, n) arrays
+        What inputs add to the slope at each stage.
+    """
+    here = start
     slopes: list[Floats] = []
     for stage, weights in enumerate(TABLEAU):
         terms = (weight * slope for weight, slope in zip(weights, slopes, strict=False) if weight)
         here = start + size * sum(terms)
-        slope = here @ turned[:, :, stage]
-        slopes.append(slope if forced is None else slope + forced[stage])
-    return slopes, here
+        slopes.append(here @ state[:, :, stage] + acting[stage])
+    return slopes[0], slopes[-1], here
