@@ -48,7 +48,7 @@ BURN_IN = 3.0
 WINDOW = 5.0
 """Number of steps over which the autocorrelation is summed up, in autocorrelation times (Sokal)."""
 
-LENGTHS = 20.0
+LENGTHS = 10.0
 """Smallest number of steps of a converged sampler, in autocorrelation times.
 
 emcee advises 50, since its estimate takes the mean of every walker for that of the posterior, and is too small by ten

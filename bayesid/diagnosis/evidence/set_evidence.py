@@ -75,6 +75,7 @@ class SetEvidence:
         self._spectra: dict[str, tuple[tuple[GroupSpectrum, ...], ...]] = {}  # of the groups of each form
         self._chosen: dict[tuple[str, ...], dict[str, int]] = {}
         self._known: dict[_Forms, float] = {}
+        self._gains: dict[tuple[_Forms, str], dict[int, float]] = {}  # beside a set, of each other cause
         self._scaled: dict[_Forms, tuple[Integers, Floats]] = {}
         if known is not None:
             self._take(known)
@@ -98,6 +99,7 @@ class SetEvidence:
             )
         self._chosen |= {names: forms for names, forms in known._chosen.items() if same.issuperset(names)}
         self._known |= {key: value for key, value in known._known.items() if same.issuperset(key[0])}
+        self._gains |= {key: gains for key, gains in known._gains.items() if same.issuperset((*key[0][0], key[1]))}
 
     @cached_property
     def catalogue(self) -> tuple[str, ...]:
@@ -166,11 +168,22 @@ class SetEvidence:
         others : iterable of str
             Causes to add, each by itself, in those of its forms that do best by themselves.
         """
-        kept = {name: self.ranked[name][:MOST_FORMS] for name in others}
-        causes = [_with_forms(self.causes[name], places) for name, places in kept.items()]
+        others, ordered = list(others), tuple(sorted(names))
+        beside: _Forms = ordered, tuple(forms[name] for name in ordered)
+        new = {name: self.ranked[name][:MOST_FORMS] for name in others if (beside, name) not in self._gains}
+        rest = self._left_by(ordered, forms, new) if ordered and new else self
+        for name, places in new.items():
+            values = rest.of_forms(name)
+            self._gains[beside, name] = dict(zip(places, values if ordered else values[list(places)], strict=True))
+        return {name: self._gains[beside, name] for name in others}
+
+    def _left_by(
+        self, names: Sequence[str], forms: Mapping[str, int], others: Mapping[str, Sequence[int]]
+    ) -> SetEvidence:
+        """Return the evidence of other causes, each in some of its forms, on what a set leaves them."""
+        causes = [_with_forms(self.causes[name], places) for name, places in others.items()]
         groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
-        rest = SetEvidence(self.beside(names, forms, groups), causes)
-        return {name: dict(zip(places, rest.of_forms(name).tolist(), strict=True)) for name, places in kept.items()}
+        return SetEvidence(self.beside(names, forms, groups), causes)
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
         """Return the groups of a set, each by its cause and its place in that, in the order of the integration.

@@ -81,12 +81,12 @@ def coordinates_shape(effect: Effect, recordings: int) -> tuple[int, ...]:
 def tables_of(effect: Effect, posterior: Posterior) -> Table:
     """Evaluate an effect's table over the recordings of a posterior."""
     grid = posterior.data.arrays.grid
-
-    def over(times: Array) -> Floats:
-        robot, pairs = posterior.model.robot, zip(posterior.manoeuvres, np.asarray(times), strict=True)
-        return np.stack([effect.in_recording(r).table(robot, one.motion, own) for r, (one, own) in enumerate(pairs)])
-
-    return Table(over(grid.node.environment.time), over(grid.sample.environment.time))
+    times = [np.asarray(side.environment.time) for side in (grid.node, grid.sample)]
+    both = np.concatenate(times, axis=1)  # what a recording needs whatever the instants is computed once
+    robot, motions = posterior.model.robot, [manoeuvre.motion for manoeuvre in posterior.manoeuvres]
+    tables = [effect.in_recording(r).table(robot, motion, both[r]) for r, motion in enumerate(motions)]
+    node, sample = np.split(np.stack(tables), [times[0].shape[1]], axis=1)
+    return Table(node, sample)
 
 
 def perturb(effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None) -> Perturbation:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple, Self, cast
 
 import jax.numpy as jnp
@@ -232,7 +231,7 @@ class JointFlexibility(_DisplacedMotion, OnJoint):
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the displacements by the deflection under the joint's torque, and by its derivatives."""
         index, state = self.index_in(robot), motion.evaluate(time)
-        deflection = _Deflection(robot, motion, index, float(time[-1]))
+        deflection = _Deflection(robot, motion, index, float(time.max()))
         motions = []
         for order in (0, 2, 1):
             for sign in (-1.0, 1.0):
@@ -342,7 +341,7 @@ class JointBacklash(_DisplacedMotion, OnJoint):
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> _Displaced:
         """Return the displacements of the link per gap of each kind, as central differences."""
         index, state = self.index_in(robot), motion.evaluate(time)
-        deflection = _Deflection(robot, motion, index, float(time[-1]))
+        deflection = _Deflection(robot, motion, index, float(time.max()))
         first, turns = _reversals(
             fine := _finely(*deflection.span), np.asarray(motion.evaluate(fine).velocity)[:, index]
         )
@@ -385,12 +384,12 @@ def _reversals(times: Floats, course: Floats) -> tuple[float, list[_Reversal]]:
     loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max(initial=0.0))
     if not len(loaded):
         return 0.0, []
-    changes = []
-    for before, after in pairwise(loaded):
-        if np.sign(course[after]) != np.sign(course[before]):
-            slope = abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
-            changes.append(_Reversal(times[after] - abs(course[after]) / slope, slope, float(np.sign(course[after]))))
-    return float(np.sign(course[loaded[0]])), changes
+    signs = np.sign(course[loaded])
+    after = loaded[1:][signs[1:] != signs[:-1]]
+    slopes = np.abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
+    zeros = times[after] - np.abs(course[after]) / slopes
+    changes = [_Reversal(*map(float, each)) for each in zip(zeros, slopes, np.sign(course[after]), strict=True)]
+    return float(signs[0]), changes
 
 
 def _across(time: Floats, crossing: _Reversal, lasts: float, power: int) -> Floats:
