@@ -11,7 +11,7 @@ from studies.common.ets7 import INTERVAL
 from studies.common.quantities import JUDGED
 from studies.common.study import Verdict
 from studies.sensors import STUDY, Effort, run
-from studies.sensors.checks import Balance, attenuation, regress, scalars, solve_balance
+from studies.sensors.checks import Balance, SmoothingErrors, attenuation, regress, scalars, solve_balance
 from studies.sensors.estimators import (
     EQUAL,
     EXACT,
@@ -212,10 +212,23 @@ def test_a_ratio_is_judged_with_its_monte_carlo_error():
 def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_honest():
     rng = np.random.default_rng(0)
     wide, right = (Spread(rng.normal(size=(400, 10)), np.full((400, 10), sd), np.ones(400)) for sd in (2.0, 1.0))
-    results = [SimpleNamespace(joints={"level": {LIKELIHOOD: wide, EXACT: exact}}) for exact in (right, wide)]
+    smoothing = {"level": SmoothingErrors(np.array([0.95, 0.85, 0.73]), np.array([0.93, 0.77, 0.58]))}
+    joints = [{"level": {LIKELIHOOD: wide, EXACT: exact}} for exact in (right, wide)]
+    results = [SimpleNamespace(joints=each, smoothing=smoothing) for each in joints]
     named, unknown = (_failing(result, "level") for result in results)
     assert "noise of the encoders" in named
+    assert "0.95, 0.85 and 0.73 times" in named
     assert "the cause is not known" in unknown
+
+
+def test_errors_of_smoothed_joints_are_overstated_at_most_by_the_motion_that_is_not_lost():
+    """Motion that is lost can only add to the noise that passes, and the smoother states both."""
+    flown = fly()
+    noise = levels(flown)["2″, 1e-9, 1e-6"]
+    errors = SmoothingErrors.of(Draws.of(flown, 6, np.random.default_rng(4)), noise)
+    assert (errors.measured > errors.expected - 0.05).all()
+    assert (errors.measured < 1.0).all()
+    assert errors.measured[2] < 0.85
 
 
 @pytest.mark.usefixtures("slow")

@@ -33,6 +33,8 @@ from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import linearise
+from bayesid.recording.jumps import smooth_joints
+from bayesid.recording.smoothing import JointSamples
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.joint_state import JointState
@@ -211,6 +213,39 @@ def attenuation(flight: Flight, noise: Noise) -> Floats:
             right += np.einsum("tci,tc->i", psi, psi @ true + arm_part)
     estimate = true - np.linalg.solve(normal, right)
     return (np.asarray(mass_com_inertia(estimate)) - paper.TRUTH) / np.abs(paper.TRUTH)
+
+
+SMOOTHED = 12  # number of sets of noise of which the errors of smoothed joints are compared with the stated ones
+
+
+@dataclass(frozen=True)
+class SmoothingErrors:
+    """Errors of smoothed joints over the stated ones, for position, velocity and acceleration."""
+
+    measured: Floats  # (3,): root mean square over sets of noise, samples and joints
+    # (3,): in closed form, for a motion far smoother than the process that the smoother takes it for
+    expected: Floats
+
+    @classmethod
+    def of(cls, draws: Draws, noise: Noise) -> SmoothingErrors:
+        """Measure the ratios at a level of noise.
+
+        A smoother weighs each frequency by ``h = 1 / (1 + (w / w0)^(2 p))``, where ``p`` is the order of its process.
+        The variance that it states for the derivative ``d`` is the integral of ``w^(2 d) h``, which holds both noise
+        that passes and motion that is lost; the noise that passes is that of ``w^(2 d) h^2``. Their ratio is ``1 - (2 d
+        + 1) / (2 p)``, and a motion without content near ``w0`` loses nothing.
+        """
+        time, truth = draws.flight.time, np.stack(motion().evaluate(draws.flight.time))
+        squares, orders = [], []
+        for errors in draws.raw("position", noise)[:SMOOTHED]:
+            joints = smooth_joints(
+                [[JointSamples(0, time, column, noise.position)] for column in (truth[0] + errors).T]
+            )
+            for index, joint in enumerate(joints):
+                squares.append((joint.evaluate(time) - truth[..., index]) ** 2 / joint.standard_deviation(time) ** 2)
+                orders.append(joint.order)
+        passing = 1.0 - (2.0 * np.arange(3) + 1.0) / (2.0 * np.array(orders)[:, None])
+        return cls(np.sqrt(np.mean(squares, axis=(0, 2))), np.sqrt(passing.mean(axis=0)))
 
 
 def solve_balance(base: Floats, arm: Floats) -> Floats:

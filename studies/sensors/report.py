@@ -28,6 +28,7 @@ from studies.common.study import (
     Verdict,
 )
 from studies.sensors import tables
+from studies.sensors.checks import SmoothingErrors
 from studies.sensors.estimators import EQUAL, EXACT, LIKELIHOOD, PAPER, WEIGHTED, WHOLE, WITHOUT_JUNCTIONS, Spread
 from studies.sensors.result import REALISTIC, Result, run
 from studies.sensors.signals import motion
@@ -246,6 +247,20 @@ def _refits(result: Result) -> str:
     )
 
 
+def _smoothed(errors: SmoothingErrors) -> str:
+    """Return why the errors of smoothed joints are overstated."""
+    measured, expected = (
+        joined([format_fixed(float(value), 2) for value in values]) for values in (errors.measured, errors.expected)
+    )
+    return (
+        "The reason: the stated errors contain noise that the smoother lets pass and motion that it removes, as they "
+        "must for a motion as rough as its process, and this motion is smoother. Errors of position, velocity and "
+        f"acceleration are {measured} times the stated ones. If only noise passed, they would be {expected} times, "
+        "√(1 − (2d + 1)/(2p)) for derivative d and a process of order p. Such errors are too large, never too small; "
+        "a planned motion without junctions would allow higher orders."
+    )
+
+
 def _failing(result: Result, level: str) -> str:
     """Return what is seen of the cause at a level where the likelihood does not state its errors rightly."""
     spread, exact = result.joints[level][LIKELIHOOD], result.joints[level][EXACT]
@@ -259,7 +274,7 @@ def _failing(result: Result, level: str) -> str:
     return (
         f"{text} With exact joints the ratio is {tables.honesty_of(exact)} and the errors are "
         f"{format_percent(share, 1)} of these at most: the wrongly stated part is the noise of the encoders after the "
-        "smoother. The reason is not known."
+        f"smoother. {_smoothed(result.smoothing[level])}"
     )
 
 

@@ -49,6 +49,7 @@ class Result:
     regressions: Mapping[str, Mapping[str, Floats]]  # estimates of the linear method
     # errors of the linear method with central differences, in closed form
     predicted: Mapping[str, Floats]
+    smoothing: Mapping[str, checks.SmoothingErrors]  # errors of smoothed joints over the stated ones
     refits: Mapping[str, Mapping[str, checks.Refits]]  # nonlinear fits by procedure; empty where the effort has none
     effort: Effort  # amount of what was computed
 
@@ -104,6 +105,7 @@ def run(
         scalars=scalars(10 * effort.draws, np.random.default_rng(int(scalar_seed))),
         regressions=regressions,
         predicted={name: checks.attenuation(free, chosen[name]) for name in regressed},
+        smoothing={name: checks.SmoothingErrors.of(draws, noise) for name, noise in chosen.items()},
         refits=refits,
         effort=effort,
     )
