@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bayesid._math.memory import GIGABYTE, refuse_beyond_memory
 from bayesid.diagnosis.candidates.cause_kind import kind_of
+from bayesid.diagnosis.candidates.event_cause import INSTANTS as EVENT_INSTANTS
 from bayesid.diagnosis.candidates.event_cause import EventCause
 from bayesid.diagnosis.candidates.generic_cause import generic_columns, instants_of_each
 from bayesid.diagnosis.candidates.instant_cause import INSTANTS, InstantCause
@@ -46,6 +47,7 @@ class RunSize:
 
     Attributes
     ----------
+    recordings : int
     rows : int
         Scalars of the residual, those that fill the recordings up to one length among them.
     shared, local : int
@@ -56,6 +58,7 @@ class RunSize:
         Nodes and samples of all recordings.
     """
 
+    recordings: int
     rows: int
     shared: int
     local: int
@@ -83,20 +86,24 @@ class RunSize:
             elif isinstance(kind_of(effect), InstantCause):
                 local += recordings * amplitudes * instants_of_each(INSTANTS, recordings)
             elif isinstance(kind_of(effect), ShapedCause):
-                times = recordings if isinstance(kind_of(effect), EventCause) else 1
-                shared[effect.label] = PROPOSED * amplitudes * times
+                shared[effect.label] = PROPOSED * amplitudes
+                if isinstance(kind_of(effect), EventCause):
+                    local += recordings * amplitudes * instants_of_each(EVENT_INSTANTS, recordings)
+            elif effect.per_recording:
+                local += recordings * amplitudes
             else:
-                times = recordings if effect.per_recording else 1
-                shared["".join(group_names(effect).values())] = amplitudes * times
+                shared["".join(group_names(effect).values())] = amplitudes
         grid = posterior.data.arrays.grid
         instants = grid.node.known.shape[1] + grid.sample.known.shape[1]
         outputs = posterior.residual_shape[1] * posterior.residual_shape[2]
-        return RunSize(recordings * outputs, sum(shared.values()), local, posterior.size, recordings * instants)
+        return RunSize(
+            recordings, recordings * outputs, sum(shared.values()), local, posterior.size, recordings * instants
+        )
 
     @property
     def memory(self) -> float:
         """Largest memory of the diagnosis [bytes]."""
-        columns = BANKS * self.shared + 4.0 * self.unknowns
+        columns = BANKS * (self.shared + self.local / self.recordings) + 4.0 * self.unknowns
         perturbations = 2.0 * TOGETHER * self.instants * (WIDTH + 6)
         return PROGRAM + NUMBER * (self.rows * columns + GRAMS * (self.shared + self.local) ** 2 + perturbations)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,18 +54,18 @@ class LinearCause(CauseKind):
         self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds
     ) -> SignatureBank:
         """Return the bank of effects, in which links that may have a body of their own share a group of moments."""
-        signatures: dict[str, Signatures] = {}
+        signatures: dict[str, list[Signatures]] = {}
         causes = []
         recordings = len(perturbed.posterior.manoeuvres)
         others = [effect.in_amplitudes() for effect in effects if effect.amplitude_units != MOMENT_UNITS]
         points = [(form, np.tile(form.starts[0], recordings if form.per_recording else 1)) for form in others]
-        columns = iter(perturbed.columns(points, fit.operating, fit.z, fit.data))
+        responses = iter(perturbed.responses(points, fit.operating, fit.z, fit.data))
         for effect in effects:
             sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
             if effect.amplitude_units == MOMENT_UNITS:
                 name = group_names(effect)[MOMENT_UNITS[0]]
                 if name not in signatures:
-                    signatures[name] = Signatures(name, _moments(perturbed, fit, effect))
+                    signatures[name] = [Signatures(name, _moments(perturbed, fit, effect))]
                 reach = sizes["kg m"] / sizes["kg"]
                 spreads = moment_spreads([quantity.unit for quantity in effect.amplitude_quantities], reach)
                 groups = [(AmplitudeGroup(name, sizes["kg"], spread=spread),) for spread in spreads]
@@ -74,15 +75,15 @@ class LinearCause(CauseKind):
                     body = MissingBody(sizes["kg"], reach, radii, rigid_moments)
                 causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:]), body=body))
                 continue
-            by_unit = amplitude_signatures(effect, next(columns), recordings)
-            signatures |= {item.name: item for item in by_unit.values()}
+            by_unit = _of_recordings(effect, next(responses))
+            signatures |= {items[0].name: items for items in by_unit.values()}
             if sizes:
-                group = tuple(AmplitudeGroup(item.name, sizes[unit]) for unit, item in by_unit.items())
+                group = tuple(AmplitudeGroup(items[0].name, sizes[unit]) for unit, items in by_unit.items())
                 causes.append(CandidateCause(effect.label, group))
             else:
-                (item,) = by_unit.values()
-                causes.append(CandidateCause(effect.label, (AmplitudeGroup(item.name, 1.0),), fixed=True))
-        return SignatureBank(tuple(signatures.values()), tuple(causes))
+                (items,) = by_unit.values()
+                causes.append(CandidateCause(effect.label, (AmplitudeGroup(items[0].name, 1.0),), fixed=True))
+        return SignatureBank(tuple(item for items in signatures.values() for item in items), tuple(causes))
 
     def present(self, fit: Fit) -> dict[str, Floats]:
         """Return the amplitudes of the fit's effects, of those that are there or not one."""
@@ -147,6 +148,21 @@ def moment_spreads(units: Sequence[str], reach: float) -> list[Floats]:
     """
     powers = np.array([MOMENT_UNITS.index(unit) for unit in units])
     return [(share * reach) ** (2.0 * powers) for share in REACHES]
+
+
+def _of_recordings(effect: Effect, responses: Floats) -> dict[str, list[Signatures]]:
+    """Return the signatures of an effect by unit, of each recording by itself where each has its own amplitudes.
+
+    Parameters
+    ----------
+    effect : Effect
+    responses : (R, N / R, n) array
+    """
+    if not effect.per_recording:
+        whole = amplitude_signatures(effect, responses.reshape(-1, responses.shape[-1]), 1)
+        return {unit: [item] for unit, item in whole.items()}
+    each = [amplitude_signatures(effect, part, 1) for part in responses]
+    return {unit: [replace(of[unit], recording=r) for r, of in enumerate(each)] for unit in each[0]}
 
 
 def amplitude_signatures(effect: Effect, columns: Floats, recordings: int) -> dict[str, Signatures]:

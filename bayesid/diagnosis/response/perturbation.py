@@ -113,7 +113,11 @@ def perturb(effect: Effect, coordinates: Floats, operating: OperatingTrajectory,
 def linear_perturbation(
     effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None
 ) -> Perturbation:
-    """Return the derivatives of `perturb` in the coordinates, leading axis n."""
+    """Return the derivatives of `perturb` in the coordinates, leading axis n.
+
+    Where each recording has n coordinates of its own, it is perturbed by these alone, all recordings at once: they are
+    independent given the model's unknowns.
+    """
     if not effect.parameters:  # the amplitude of what is either there or not
         return jax.tree.map(lambda x: x[None], perturb(effect, coordinates, operating, table))
     if effect.modes_count:
@@ -122,7 +126,7 @@ def linear_perturbation(
         count = len(coordinates)
         rows = [(part[:count] - part[count:]) / (2.0 * DIFFERENCE) for part in operating.vibration.rows(effect, values)]
         return _nothing(operating, (count,))._replace(node_rows=rows[0], sample_rows=rows[1])
-    slopes = _nothing(operating, (len(coordinates),))
+    slopes = _nothing(operating, (len(effect.parameters),))
     if _acts(effect):
         hooks = _differentiate(*_given(effect, operating), coordinates, *operating[1:4], _steps(operating))
         slopes = slopes._replace(**{key: np.moveaxis(np.asarray(value), -1, 0) for key, value in hooks.items()})
@@ -246,8 +250,16 @@ _evaluate = kept_jit(static=2)(_hooks)
 
 
 @kept_jit(static=2)
-def _differentiate(key: EffectKey, kinds: tuple[SensorKind, ...], *numbers: Any) -> dict[str, Array]:
-    return jax.jacfwd(partial(_hooks, key, kinds), argnums=1)(*numbers)
+def _differentiate(
+    key: EffectKey, kinds: tuple[SensorKind, ...], given: _Given, coordinates: Array, *motion: Any
+) -> dict[str, Array]:
+    """Return the derivatives of `_hooks` in a shift of the coordinates that is common to all recordings."""
+    count = len(given.prior.mean)
+
+    def shifted(shift: Array) -> dict[str, Array]:
+        return _hooks(key, kinds, given, (coordinates.reshape(-1, count) + shift).ravel(), *motion)
+
+    return jax.jacfwd(shifted)(jnp.zeros(count))
 
 
 def _couple(momentum: Array, rate: Array) -> Array:

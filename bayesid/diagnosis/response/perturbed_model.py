@@ -382,9 +382,28 @@ class PerturbedModel:
     ) -> list[Floats]:
         """Return derivatives of the residual in the coordinates of each effect, (N, n).
 
-        What all of them change is whitened together, in full batches.
+        Where each recording has coordinates of its own, all are side by side, recording after recording.
         """
         effects = list(effects)
+        columns = []
+        for (effect, _), part in zip(effects, self.responses(effects, operating, z, data), strict=True):
+            recordings, rows, count = part.shape
+            if effect.per_recording:
+                own = np.arange(recordings)
+                whole = np.zeros((recordings, rows, recordings, count))
+                whole[own, :, own] = part
+                part = whole
+            columns.append(part.reshape(recordings * rows, -1))
+        return columns
+
+    def responses(
+        self, effects: Sequence[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
+    ) -> list[Floats]:
+        """Return derivatives of the residual of each recording in the coordinates of each effect, (R, N / R, n).
+
+        Where each recording has coordinates of its own, they are the derivatives in these. What all effects change is
+        whitened together, in full batches.
+        """
         if not effects:
             return []
         linear = self._about(z, data)
@@ -392,18 +411,19 @@ class PerturbedModel:
         def changes(item: tuple[Effect, Floats]) -> tuple[Floats, Floats]:
             return linear.changes(linear_perturbation(*item, operating, self._table(item[0])))
 
-        columns: list[Floats] = []
+        responses: list[Floats] = []
         for some in self._shared_out(effects, READ * self.most_pushes):
             raw, offset = zip(*in_threads(changes, some), strict=True)
             ends = np.cumsum([len(part) for part in raw])[:-1]
             whitened = linear.whitened(np.concatenate(raw), np.concatenate(offset))
-            columns += [part.reshape(len(part), -1).T for part in np.split(whitened, ends)]
-        return columns
+            parts = np.split(whitened.reshape(*whitened.shape[:2], -1), ends)
+            responses += [np.moveaxis(part, 0, -1) for part in parts]
+        return responses
 
     @staticmethod
     def _shared_out(effects: Sequence[tuple[Effect, Floats]], most: int) -> Iterator[Sequence[tuple[Effect, Floats]]]:
-        """Yield effects in groups with about so many coordinates in all."""
-        count = max(1, most // max(coordinates.size for _, coordinates in effects))
+        """Yield effects in groups with about so many parameters in all."""
+        count = max(1, most // max(len(effect.parameters) for effect, _ in effects))
         yield from (effects[first : first + count] for first in range(0, len(effects), count))
 
     def columns_together(
