@@ -23,6 +23,7 @@ from bayesid.recording.full_rate import spikes
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.lattice import lattice_step, mean_deviation
 from bayesid.recording.recording import Recording
+from bayesid.recording.shocks import ShakenSensor, Shock, shocks
 from bayesid.recording.wheel_motion import WheelMotion, check_wheels
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Grid, TimeTables
@@ -299,6 +300,8 @@ class RecordedSamples:
         Step of the lattice on which the samples of each column lie, None where on none or where nothing is reduced.
     spikes : mapping of str to array
         How far each sample departs that no mean over a block holds, since it is a spike [standard deviations].
+    shocks : tuple of Shock
+        Times within which all inertial sensors are shaken, whose samples are left out.
     series : mapping of SensorKind to Series
         Recorded times and readings of each sensor.
     torque : Series
@@ -318,6 +321,7 @@ class RecordedSamples:
     blocks: Mapping[str, Blocks]
     steps: Mapping[str, tuple[float | None, ...]]
     spikes: Mapping[str, Floats]
+    shocks: tuple[Shock, ...]
     series: Mapping[SensorKind, Series]
     torque: Series
     torque_rows: tuple[Integers, ...]
@@ -343,14 +347,19 @@ class RecordedSamples:
         check_wheels(recording, model.robot.wheels)
         effects = [effect.in_recording(index) for effect in model.effects]
         jumps = [instant for effect in effects for instant in effect.jumps(float(recording.time[-1]))]
-        breaks = np.concatenate([Actions.from_recording(recording, (), per_second).changes, jumps])
+        recorded = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
+        shaken = shocks_of(model.sensors, recorded, per_second)
+        middles = [shock.middle for shock in shaken]
+        breaks = np.concatenate([Actions.from_recording(recording, (), per_second).changes, jumps, middles])
         blocks: dict[str, Blocks] = {}
         steps: dict[str, tuple[float | None, ...]] = {}
         departures: dict[str, Floats] = {}
         series: dict[SensorKind, Series] = {}
         for sensor in model.sensors:
             kind = sensor.kind
-            stamps, values = _series(recording, kind.value, kind.axes)
+            stamps, values = recorded[kind]
+            quiet = ~np.any([shock.holds(stamps) for shock in shaken], axis=0) if shaken else slice(None)
+            stamps, values = stamps[quiet], values[quiet]
             if kind.is_difference and Blocks.of(stamps, per_second).reduced:
                 sigma = sensor.noise.sigma(float(np.median(np.diff(stamps))))
                 each = [spikes(column, float(level)) for column, level in zip(values.T, sigma, strict=True)]
@@ -381,6 +390,7 @@ class RecordedSamples:
             blocks,
             steps,
             departures,
+            tuple(shaken),
             series,
             torque,
             used,
@@ -514,6 +524,25 @@ class RecordedSamples:
             relative = mean_deviation(one, values[:, axis], float(sigma), self.steps[sensor.kind.value][axis])
             channels.append(NoiseChannel(sigma * relative, rows, filtered, (level, memory), one.count, one.interval))
         return channels
+
+
+def shocks_of(sensors: Sequence[Sensor], recorded: Mapping[SensorKind, Series], per_second: float) -> list[Shock]:
+    """Return the times within which all inertial sensors of a recording are shaken.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    recorded : mapping of SensorKind to Series
+        All samples of each of them.
+    per_second : float
+        Rate of the blocks that they are averaged over [1/s].
+    """
+    samples = []
+    for sensor in sensors:
+        if sensor.kind in (SensorKind.RATE, SensorKind.ACCEL):
+            time, values = recorded[sensor.kind]
+            samples.append(ShakenSensor(time, values, sensor.noise.sigma(float(np.median(np.diff(time))))))
+    return shocks(samples, per_second)
 
 
 def _steps(blocks: Blocks, values: Floats) -> tuple[float | None, ...]:

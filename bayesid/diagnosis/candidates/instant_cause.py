@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations_with_replacement, product
 
 import numpy as np
 
@@ -94,7 +95,7 @@ class InstantCause(CauseKind):
         grid = _grid(fit)
         banks = []
         for effect in effects:
-            columns = self.responses(perturbed, fit, effect, grid)
+            columns = self.responses(perturbed, fit, effect, _padded(grid))
             size, spread = _spread(effect, bounds[effect.label])
             signatures = [
                 Signatures(
@@ -186,7 +187,7 @@ class InstantCause(CauseKind):
         size, spread = _spread(effect, bounds)
         group = AmplitudeGroup(effect.label, size, spread=spread)
         chosen: list[float | None] = [None] * len(ends)
-        reach = ends / grid.shape[1]
+        reach = ends / instants_of_each(INSTANTS, len(ends))
         choices = [list(map(float, row)) for row in grid]
         while True:
             chosen = self._sought(point, effect, others, group, choices, chosen)
@@ -224,13 +225,14 @@ class InstantCause(CauseKind):
         chosen: Sequence[float | None],
     ) -> list[float | None]:
         """Return the best instant of each recording among some, or None where the cause does not act."""
-        most = max(map(len, choices))
-        padded = np.array([[*row, *[np.inf] * (most - len(row))] for row in choices])
+        padded = _padded(choices)
         columns = self.responses(point.perturbed, point.fit, effect, padded)
         items = [Signatures(f"{r},{k}", columns[r, k], r) for r, row in enumerate(choices) for k in range(len(row))]
         gram = _beside(point, items, others, effect.label)
         best = [None if now is None else int(np.argmin(np.abs(padded[r] - now))) for r, now in enumerate(chosen)]
         sizes = [len(row) for row in choices]
+        if not any(k is not None for k in best):
+            best = _best_pair(gram, group, sizes)
         value = _weighed(gram, group, best, sizes)
         for _ in range(SWEEPS):
             before = list(best)
@@ -292,10 +294,18 @@ def grid_instants(end: float, count: int = INSTANTS) -> Floats:
     return end * (np.arange(count) + 0.5) / count
 
 
-def _grid(fit: Fit) -> Floats:
-    """Return the grid of every recording, (R, K) [s]."""
+def _grid(fit: Fit) -> list[Floats]:
+    """Return the instants [s] at which a jump is tried first in every recording: an even grid, and its shocks."""
     ends = np.asarray(fit.operating.node.environment.time).max(axis=1)
-    return np.stack([grid_instants(float(end), instants_of_each(INSTANTS, len(ends))) for end in ends])
+    count = instants_of_each(INSTANTS, len(ends))
+    felt = [[shock.middle for shock in recorded.shocks] for recorded in fit.posterior.data.recorded]
+    return [np.append(grid_instants(float(end), count), own) for end, own in zip(ends, felt, strict=True)]
+
+
+def _padded(rows: Sequence[Floats | Sequence[float]]) -> Floats:
+    """Return instants of each recording as an array (R, K) whose shorter rows end with infinite ones."""
+    most = max(map(len, rows))
+    return np.array([[*row, *[np.inf] * (most - len(row))] for row in rows])
 
 
 def sample_intervals(fit: Fit) -> list[Floats]:
@@ -333,6 +343,19 @@ def _beside(point: Linearisation, items: Sequence[Signatures], others: Sequence[
     bank = SignatureBank((*rest, *items), (*(evidence.causes[name] for name in others), cause))
     own = point.with_bank(bank).evidence
     return own.beside(others, own.forms(others), [item.name for item in items])
+
+
+def _best_pair(gram: Gram, group: AmplitudeGroup, sizes: Sequence[int]) -> list[int | None]:
+    """Return the best instants of one or two recordings, and None of the others, from which all are sought in turn.
+
+    A jump in one recording by itself may be imitated by one at its begin, which makes the body of this recording another
+    than that of the rest, and no further instant betters that.
+    """
+    tried: list[list[int | None]] = [[None] * len(sizes)]
+    for one, other in combinations_with_replacement(range(len(sizes)), 2):
+        pairs = product(range(sizes[one]), range(sizes[other])) if one != other else ((k, k) for k in range(sizes[one]))
+        tried += [[{one: k, other: j}.get(r) for r in range(len(sizes))] for k, j in pairs]
+    return max(tried, key=lambda trial: _weighed(gram, group, trial, sizes))
 
 
 def _weighed(gram: Gram, group: AmplitudeGroup, best: Sequence[int | None], sizes: Sequence[int]) -> float:
