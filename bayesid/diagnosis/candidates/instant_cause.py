@@ -348,8 +348,8 @@ def _beside(point: Linearisation, items: Sequence[Signatures], others: Sequence[
 def _best_pair(gram: Gram, group: AmplitudeGroup, sizes: Sequence[int]) -> list[int | None]:
     """Return the best instants of one or two recordings, and None of the others, from which all are sought in turn.
 
-    A jump in one recording by itself may be imitated by one at its begin, which makes the body of this recording another
-    than that of the rest, and no further instant betters that.
+    Jumps in two recordings may be imitated by a single one at the start of either, which gives that recording a body of
+    its own, and from there no change of one instant alone leads to both.
     """
     tried: list[list[int | None]] = [[None] * len(sizes)]
     for one, other in combinations_with_replacement(range(len(sizes)), 2):

@@ -7,7 +7,8 @@ study files; the class states everything else that the package needs to know of 
 # the order of registration is that of the catalogue
 # isort: off
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
-from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointBacklash, JointFlexibility, JointLatency
+from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.joint_backlash import JointBacklash
 from bayesid.simulation.effects.systematic_faults import (
     AccelPosition,
     AttitudeMisalignment,

@@ -1,0 +1,200 @@
+"""Effect of the play of a joint."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple, Self
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import MeasuredMotion, Motion
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.displaced_motion import KNOTS, Deflection, Displaced, DisplacedMotion
+from bayesid.simulation.effects.effect import Situation
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Quantity
+from bayesid.simulation.effects.placed import OnJoint
+from bayesid.simulation.effects.register import register
+
+__all__ = ["JointBacklash"]
+
+LARGEST_GAP, LARGEST_GAP_OF_SLIDE = 0.01, 1.0e-3
+"""Largest plausible play of a joint [rad, m]; assumed, since the hand would feel more."""
+
+TYPICAL_GAP = 1.0e-3
+"""Play for which the time is computed that a link takes to cross it [rad or m]."""
+
+QUICKEST, SLOWEST = 0.05, 5.0
+"""Shortest and longest time of a crossing [s]."""
+
+UNLOADED = 1.0e-3
+"""Torque through a joint, or its speed, relative to the largest below which it presses to neither side."""
+
+FINE = 20
+"""Instants per interval between knots at which the sign of the torque is looked at."""
+
+
+@register
+class JointBacklash(DisplacedMotion, OnJoint):
+    """Play of a joint: the link is offset from the encoder, at one side of a gap, and occasionally crosses the gap.
+
+    One of two mechanisms presses it to a side. Without friction it is the torque through the joint: the flank that
+    drives the link pushes it from behind, so that it trails the encoder in the direction of its acceleration. When the
+    torque changes its sign, the link coasts from one flank to the other; the duration follows from the slope of the
+    torque and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
+    the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link trails
+    in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits until
+    the gap is crossed, or the link moves on evenly and the encoder leaps; the leap has the form that it has in the
+    smoothed recording. In a gear with some friction, each mechanism contributes a part.
+    """
+
+    name = "joint-backlash"
+    summary = (
+        "The joint has play: the bodies beyond it shift by the gap when the torque through the joint reverses or, with "
+        "friction, when the joint reverses its motion."
+    )
+    separated_by = (
+        "It jumps when the joint's torque or motion reverses, by the same angle at any speed: accelerate and brake "
+        "that joint slowly and fast."
+    )
+
+    def __init__(self, place: str = "", sigma: float = TYPICAL_GAP) -> None:
+        super().__init__(place)
+        self.parameters = tuple(Parameter(name, "rad", sigma) for name in ("coasting", "waiting", "leaping"))
+
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect with the unit of its joint's position."""
+        changed = copy.copy(self)
+        unit = robot.joints[self.index_in(robot)].unit
+        changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
+        return changed
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return a play that can be felt by hand."""
+        if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
+            reason = f"On a prismatic joint, more than {LARGEST_GAP_OF_SLIDE:g} m of play can be felt by hand."
+            return (PhysicalBound("m", LARGEST_GAP_OF_SLIDE, reason),)
+        reason = f"On a joint, more than {LARGEST_GAP:g} rad of play, half a degree, can be felt by hand."
+        return (PhysicalBound("rad", LARGEST_GAP, reason),)
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """The gap, and its shares."""
+        shares = super().quantities
+        return [Quantity("gap", shares[0].unit), *shares]
+
+    def report(self, values: Array) -> Array:
+        """Return the gap, and its shares."""
+        return jnp.concatenate([values.sum(keepdims=True), values])
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return the displacements of the link per gap of each kind, as central differences."""
+        index, state = self.index_in(robot), motion.evaluate(time)
+        deflection = Deflection(robot, motion, index, float(time[-1]))
+        first, turns = _reversals(
+            fine := _finely(*deflection.span), np.asarray(motion.evaluate(fine).velocity)[:, index]
+        )
+
+        def leap(at: Floats) -> Floats:
+            return _lagging(at, first, [(turn, QUICKEST) for turn in turns])
+
+        smoothed = motion.joints[index].of_course(leap) if isinstance(motion, MeasuredMotion) else None
+        # the link rests until the motor, which has this acceleration, has crossed the gap
+        waits = [(turn, float(np.clip((2.0 * TYPICAL_GAP / turn.slope) ** 0.5, QUICKEST, SLOWEST))) for turn in turns]
+        sides = (
+            _side_by_torque(deflection, time),
+            _lagging(time, first, waits),
+            leap(time) if smoothed is None else smoothed.evaluate(time),
+        )
+        motions = []
+        for side in sides:
+            for sign in (-1.0, 1.0):
+                changed = [np.array(values) for values in state]
+                for derivative in range(3):
+                    changed[derivative][:, index] += sign * TYPICAL_GAP * side[derivative]
+                motions.append(kinematics(robot, JointState(*changed)))
+        return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]) / TYPICAL_GAP)
+
+    def loads(self, values: Array) -> Array:
+        """Return the gaps."""
+        return values
+
+
+class _Reversal(NamedTuple):
+    """Change of the sign of a course: when it is zero, its slope there, and the side that it takes, 1 or -1."""
+
+    time: float
+    slope: float
+    side: float
+
+
+def _reversals(times: Floats, course: Floats) -> tuple[float, list[_Reversal]]:
+    """Return the first sign of a course (n,) at some times (n,), and its changes; where it is small it has none."""
+    loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max(initial=0.0))
+    if not len(loaded):
+        return 0.0, []
+    changes = []
+    for before, after in pairwise(loaded):
+        if np.sign(course[after]) != np.sign(course[before]):
+            slope = abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
+            changes.append(_Reversal(times[after] - abs(course[after]) / slope, slope, float(np.sign(course[after]))))
+    return float(np.sign(course[loaded[0]])), changes
+
+
+def _across(time: Floats, crossing: _Reversal, lasts: float, power: int) -> Floats:
+    """Return the way across the gap, from 0 to 1 in some time, with two derivatives at the times (T,): shape (3, T)."""
+    x = np.clip((time - crossing.time) / lasts, 0.0, 1.0)
+    there = x < 1.0
+    first = there * power * x ** (power - 1) / lasts
+    second = (there & (x > 0.0)) * power * (power - 1) * x ** (power - 2) / lasts**2
+    return crossing.side * np.stack([x**power, first, second])
+
+
+def _side_by_torque(deflection: Deflection, time: Floats) -> Floats:
+    """Return where in the gap a link lies, from -1/2 to 1/2, with two derivatives at the times (T,): shape (3, T).
+
+    Parameters
+    ----------
+    deflection : Deflection
+        Negative torque through the joint by the inertia beyond it.
+    time : (T,) array
+        Times [s].
+    """
+    fine = _finely(*deflection.span)
+    first, reversals = _reversals(fine, deflection.derivative(fine, 0))
+    side = np.zeros((3, len(time)))
+    side[0] = 0.5 * first
+    for crossing in reversals:
+        # beside a motor that loses on it with this jerk, a coasting link crosses the gap in the third root of 6 g/j
+        jerk = crossing.slope * np.interp(crossing.time, *deflection.mobility)
+        side += _across(time, crossing, float(np.clip((6.0 * TYPICAL_GAP / jerk) ** (1.0 / 3.0), QUICKEST, SLOWEST)), 3)
+    return side
+
+
+def _lagging(time: Floats, first: float, turns: Sequence[tuple[_Reversal, float]]) -> Floats:
+    """Return where in the gap a link lies that lags the motion of its joint, shape (3, T), as `_side_by_torque`.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Times [s].
+    first : float
+        Sign of the joint's speed at first.
+    turns : sequence of pairs
+        Changes of that sign, each with the time that it takes to cross the gap [s].
+    """
+    side = np.zeros((3, len(time)))
+    side[0] = -0.5 * first
+    for turn, lasts in turns:
+        side -= _across(time, turn, lasts, 2)
+    return side
+
+
+def _finely(begin: float, end: float) -> Floats:
+    return np.linspace(begin, end, FINE * max(int((end - begin) / KNOTS), 1) + 1)
