@@ -81,6 +81,18 @@ class JointSamples:
         """Standard deviation of each value over that of a sample, (n,)."""
         return np.ones(len(self.time)) if self.means is None else self.means.relative
 
+    def of_course(self, course: Callable[[Floats], Floats]) -> JointSamples:
+        """Return the samples of another course of the position, averaged over the same blocks.
+
+        Parameters
+        ----------
+        course : callable
+            Position, velocity and acceleration of the course, (3, n), at some times (n,).
+        """
+        if self.means is None:
+            return replace(self, value=course(self.time)[self.derivative])
+        return replace(self, value=self.means.blocks.mean(course(self.means.samples.time)[self.derivative]))
+
     def reduced(self, per_second: float) -> JointSamples:
         """Return means of the samples over blocks; the samples themselves where they are no faster than these.
 
@@ -96,7 +108,7 @@ class JointSamples:
         sigma = (step or 1.0) / math.sqrt(12.0) if self.sigma is None else self.sigma
         apart = self.time - np.repeat(blocks.time, blocks.count)
         moments = np.stack([blocks.mean(apart**power) for power in range(5)], axis=1)
-        means = BlockMeans(self, moments, mean_deviation(blocks, value, sigma, step))
+        means = BlockMeans(self, blocks, moments, mean_deviation(blocks, value, sigma, step))
         return JointSamples(self.derivative, blocks.time, value, self.sigma, means)
 
 
@@ -107,6 +119,7 @@ class BlockMeans:
     Parameters
     ----------
     samples : JointSamples
+    blocks : Blocks
     moments : (n, 5) array
         Mean powers 0 to 4 of the samples' times since the mean time of their block [s^power].
     relative : (n,) array
@@ -114,6 +127,7 @@ class BlockMeans:
     """
 
     samples: JointSamples
+    blocks: Blocks
     moments: Floats
     relative: Floats
 
@@ -173,7 +187,7 @@ class SmoothedJoint:
         course : callable
             Position, velocity and acceleration of the course, (3, n), at some times (n,).
         """
-        series = tuple(replace(one, value=course(one.time)[one.derivative]) for one in self.series)
+        series = tuple(one.of_course(course) for one in self.series)
         start = None if self.start is None else float(course(np.zeros(1))[0, 0])
         other = replace(self, series=series, start=start)
         problem, sigmas = other._problem
