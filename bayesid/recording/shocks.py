@@ -6,8 +6,8 @@ moments of mass. Readings within the motion say how the part has moved, which no
 Slow sensors miss it between two samples. Of fast ones, the readings within it are left out.
 
 A shock is short, isolated, and common to the sensors: one that is disturbed by itself is faulty. A reading is shaken if
-it lies outside of the range between the levels before and after it, so that a step, such as that by a kick or of a
-bias, is no shock.
+it lies outside of the range between the levels before and after it, by more than these bend: a step, such as that by a
+kick or of a bias, is no shock.
 """
 
 from __future__ import annotations
@@ -99,26 +99,19 @@ def shocks(sensors: Sequence[ShakenSensor], blocks_per_second: float) -> list[Sh
             for other in _disturbances(sensor, longest)
             if other.begin < one.end + margin and one.begin < other.end + margin
         ]
-    return [one for one in found if one.end - one.begin <= longest]
+    borders = [-np.inf, *(edge for one in found for edge in one), np.inf]
+    quiet = np.diff(borders)[::2] > ISOLATED * longest
+    return [one for k, one in enumerate(found) if quiet[k] and quiet[k + 1] and one.end - one.begin <= longest]
 
 
 def _disturbances(sensor: ShakenSensor, longest: float) -> list[Shock]:
-    """Return the short and isolated times in which a sensor departs from both levels before and after."""
+    """Return the times in which a sensor departs from the levels before and after, and rests in between."""
     shaken = np.zeros(len(sensor.time), dtype=bool)
     for column, sigma in zip(sensor.values.T, sensor.sigma, strict=True):
         shaken |= _shaken(column, float(sigma), longest / sensor.interval)
     times = sensor.time[shaken]
-    if not len(times):
-        return []
-    runs = np.split(times, np.flatnonzero(np.diff(times) > longest) + 1)
-    begins, ends = np.array([run[0] for run in runs]), np.array([run[-1] for run in runs])
-    quiet = np.diff(np.concatenate([[-np.inf], np.ravel([begins, ends], order="F"), [np.inf]]))[::2]
-    alone = (quiet[:-1] > ISOLATED * longest) & (quiet[1:] > ISOLATED * longest)
-    return [
-        Shock(float(begin), float(end))
-        for begin, end, kept in zip(begins, ends, alone & (ends - begins <= longest), strict=True)
-        if kept
-    ]
+    runs = np.split(times, np.flatnonzero(np.diff(times) > longest) + 1) if len(times) else []
+    return [Shock(float(run[0]), float(run[-1])) for run in runs]
 
 
 def _shaken(values: Floats, sigma: float, longest: float) -> Bools:
@@ -136,7 +129,8 @@ def _shaken(values: Floats, sigma: float, longest: float) -> Bools:
     apart = int(np.ceil((1.0 + 0.5 * AROUND) * longest))
     level = median_filter(values, width, mode="nearest")
     place = np.arange(len(values))
-    before, after = level[np.maximum(place - apart, 0)], level[np.minimum(place + apart, len(values) - 1)]
+    earlier, before, after, later = (level[np.clip(place + k * apart, 0, len(level) - 1)] for k in (-2, -1, 1, 2))
     outside = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
+    bend = np.abs(before + after - earlier - later) / 6.0  # between the levels, by the cubic through all four
     bound = float(stats.norm.isf(0.5 * LEVEL / len(values))) * np.sqrt(1.0 + 0.5 * np.pi / width)
-    return np.asarray(outside > bound * sigma)
+    return np.asarray(outside > bound * sigma + bend)
