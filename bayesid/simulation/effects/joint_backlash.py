@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.polynomial import Polynomial
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
@@ -33,8 +35,21 @@ TYPICAL_GAP = 1.0e-3
 QUICKEST, SLOWEST = 0.05, 5.0
 """Shortest and longest time of a crossing [s]."""
 
-UNLOADED = 1.0e-3
-"""Torque through a joint, or its speed, relative to the largest below which it presses to neither side."""
+CREEPING = {"sharp": 3.0e-4, "even": 1.0e-3, "soft": 3.0e-3}
+"""Speeds below which friction does not press a link fully to one side, half a decade apart [rad/s or m/s]."""
+
+BRIDGED, NEARBY = 0.4, 2.0
+"""Time before and after a reversal in which the smoothed record holds what the encoder leaps, and time within which its
+speed is that of the motion again [s]."""
+
+ROUNDING = 1.0e-9
+"""Imaginary part of a root that is real [s]."""
+
+CUBIC = 3
+"""Degree of the polynomial by which the speed passes through zero."""
+
+UNLOADED, SLOW = 1.0e-3, 1.0e-2
+"""Torque through a joint, and its speed, relative to the largest below which they move the link to no other side."""
 
 FINE = 20
 """Instants per interval between knots at which the sign of the torque is looked at."""
@@ -50,8 +65,10 @@ class JointBacklash(DisplacedMotion, OnJoint):
     torque and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
     the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link trails
     in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits until
-    the gap is crossed, or the link moves on evenly and the encoder leaps; the leap has the form that it has in the
-    smoothed recording. In a gear with some friction, each mechanism contributes a part.
+    the gap is crossed, or the link moves on evenly and the encoder leaps while the friction changes its sign, which it
+    does with the speed of the link: the leap lasts as long as the link is slow. It has three parts, for three such
+    speeds (`CREEPING`), which allow for any friction, and the form that it has in the smoothed recording, which is
+    averaged over blocks and rings. In a gear with some friction, each mechanism contributes a part.
     """
 
     name = "joint-backlash"
@@ -64,9 +81,11 @@ class JointBacklash(DisplacedMotion, OnJoint):
         "that joint slowly and fast."
     )
 
+    _kinds = ("coasting", "waiting", *(f"leaping.{name}" for name in CREEPING))
+
     def __init__(self, place: str = "", sigma: float = TYPICAL_GAP) -> None:
         super().__init__(place)
-        self.parameters = tuple(Parameter(name, "rad", sigma) for name in ("coasting", "waiting", "leaping"))
+        self.parameters = tuple(Parameter(name, "rad", sigma) for name in self._kinds)
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the unit of its joint's position."""
@@ -97,20 +116,14 @@ class JointBacklash(DisplacedMotion, OnJoint):
         """Return the displacements of the link per gap of each kind, as central differences."""
         index, state = self.index_in(robot), motion.evaluate(time)
         deflection = Deflection(robot, motion, index, float(time[-1]))
-        first, turns = _reversals(
-            fine := _finely(*deflection.span), np.asarray(motion.evaluate(fine).velocity)[:, index]
-        )
-
-        def leap(at: Floats) -> Floats:
-            return _lagging(at, first, [(turn, QUICKEST) for turn in turns])
-
-        smoothed = motion.joints[index].of_course(leap) if isinstance(motion, MeasuredMotion) else None
+        speed = _Speed.of(motion, index, *deflection.span)
         # the link rests until the motor, which has this acceleration, has crossed the gap
-        waits = [(turn, float(np.clip((2.0 * TYPICAL_GAP / turn.slope) ** 0.5, QUICKEST, SLOWEST))) for turn in turns]
+        times = [(2.0 * TYPICAL_GAP / turn.slope) ** 0.5 for turn in speed.turns]
+        waits = [(turn, float(np.clip(one, QUICKEST, SLOWEST))) for turn, one in zip(speed.turns, times, strict=True)]
         sides = (
             _side_by_torque(deflection, time),
-            _lagging(time, first, waits),
-            leap(time) if smoothed is None else smoothed.evaluate(time),
+            _lagging(time, speed.first, waits),
+            *(speed.leap(time, creeping) for creeping in CREEPING.values()),
         )
         motions = []
         for side in sides:
@@ -119,7 +132,7 @@ class JointBacklash(DisplacedMotion, OnJoint):
                 for derivative in range(3):
                     changed[derivative][:, index] += sign * TYPICAL_GAP * side[derivative]
                 motions.append(kinematics(robot, JointState(*changed)))
-        return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]) / TYPICAL_GAP)
+        return Displaced(motions, np.kron(np.eye(len(sides)), [-0.5, 0.5]) / TYPICAL_GAP)
 
     def loads(self, values: Array) -> Array:
         """Return the gaps."""
@@ -134,9 +147,9 @@ class _Reversal(NamedTuple):
     side: float
 
 
-def _reversals(times: Floats, course: Floats) -> tuple[float, list[_Reversal]]:
-    """Return the first sign of a course (n,) at some times (n,), and its changes; where it is small it has none."""
-    loaded = np.flatnonzero(np.abs(course) > UNLOADED * np.abs(course).max(initial=0.0))
+def _reversals(times: Floats, course: Floats, least: float) -> tuple[float, list[_Reversal]]:
+    """Return the first sign of a course (n,) at some times (n,), and its changes; below a share of it, it has none."""
+    loaded = np.flatnonzero(np.abs(course) > least * np.abs(course).max(initial=0.0))
     if not len(loaded):
         return 0.0, []
     changes = []
@@ -167,7 +180,7 @@ def _side_by_torque(deflection: Deflection, time: Floats) -> Floats:
         Times [s].
     """
     fine = _finely(*deflection.span)
-    first, reversals = _reversals(fine, deflection.derivative(fine, 0))
+    first, reversals = _reversals(fine, deflection.derivative(fine, 0), UNLOADED)
     side = np.zeros((3, len(time)))
     side[0] = 0.5 * first
     for crossing in reversals:
@@ -194,6 +207,93 @@ def _lagging(time: Floats, first: float, turns: Sequence[tuple[_Reversal, float]
     for turn, lasts in turns:
         side -= _across(time, turn, lasts, 2)
     return side
+
+
+@dataclass(frozen=True)
+class _Speed:
+    """Speed of a joint's motion, without what its encoder leaps when it reverses.
+
+    While a leap lasts, the recorded speed is mostly its own: it changes its sign before the motion does, too steeply,
+    and again where the smoothing rings. The speeds before and after are those of the motion, and a cubic through them
+    passes through zero when the motion reverses.
+
+    Attributes
+    ----------
+    motion : Motion
+    index : int
+        Number of the joint.
+    first : float
+        Sign of the speed at first.
+    turns : tuple of _Reversal
+    """
+
+    motion: Motion
+    index: int
+    first: float
+    turns: tuple[_Reversal, ...]
+
+    @classmethod
+    def of(cls, motion: Motion, index: int, begin: float, end: float) -> _Speed:
+        """Return the speed of a joint between two times [s]."""
+        fine = _finely(begin, end)
+        speed = np.asarray(motion.evaluate(fine).velocity)[:, index]
+        first, changes = _reversals(fine, speed, SLOW)
+        times = np.array([change.time for change in changes])
+        groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > BRIDGED) + 1) if len(times) else []
+        middles = [0.5 * float(times[group[0]] + times[group[-1]]) for group in groups]
+        borders = [-np.inf, *(0.5 * (one + other) for one, other in pairwise(middles)), np.inf]
+        turns = []
+        for group, middle, (left, right) in zip(groups, middles, pairwise(borders), strict=True):
+            if len(group) % 2 == 0:  # the motion goes on as before
+                continue
+            away = np.abs(fine - middle)
+            used = (away > BRIDGED) & (away < NEARBY) & (fine > left) & (fine < right)
+            turns.append(_through_zero(fine[used], speed[used], middle, changes[group[-1]]))
+        return cls(motion, index, first, tuple(turns))
+
+    def leap(self, time: Floats, creeping: float) -> Floats:
+        """Return where in the gap a link lies whose encoder leaps while it is slow, as its record shows it, (3, T).
+
+        Parameters
+        ----------
+        time : (T,) array
+            Times [s].
+        creeping : float
+            Speed below which the link is slow.
+        """
+        lasts = [np.clip(2.0 * creeping / turn.slope, QUICKEST, SLOWEST) for turn in self.turns]
+
+        def course(at: Floats) -> Floats:
+            side = np.zeros((3, len(at)))
+            side[0] = -0.5 * self.first
+            for turn, one in zip(self.turns, lasts, strict=True):
+                side -= _about(at, turn, float(one))
+            return side
+
+        if not isinstance(self.motion, MeasuredMotion):
+            return course(time)
+        return self.motion.joints[self.index].of_course(course).evaluate(time)
+
+
+def _about(time: Floats, crossing: _Reversal, lasts: float) -> Floats:
+    """Return the way across the gap in some time about a reversal, as `_across`: a quintic step."""
+    x = np.clip((time - crossing.time) / lasts + 0.5, 0.0, 1.0)
+    first = 30.0 * x**2 * (1.0 - x) ** 2 / lasts
+    second = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / lasts**2
+    return crossing.side * np.stack([x**3 * (10.0 - 15.0 * x + 6.0 * x**2), first, second])
+
+
+def _through_zero(times: Floats, speed: Floats, middle: float, otherwise: _Reversal) -> _Reversal:
+    """Return the reversal near a time by the cubic through speeds (n,) before and after it, or another without one."""
+    if not (times < middle).sum() > CUBIC < (times > middle).sum():
+        return otherwise
+    cubic = Polynomial.fit(times, speed, CUBIC)
+    roots = cubic.roots()
+    near = roots.real[(np.abs(roots.imag) < ROUNDING) & (np.abs(roots.real - middle) < BRIDGED)]
+    if not len(near):
+        return otherwise
+    time = float(near[np.argmin(np.abs(near - middle))])
+    return otherwise._replace(time=time, slope=float(abs(cubic.deriv()(time))))
 
 
 def _finely(begin: float, end: float) -> Floats:
