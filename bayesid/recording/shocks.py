@@ -29,6 +29,9 @@ HALF_PERIOD = 2.5
 LEVEL = 1e-3
 """Probability that noise shakes a channel of a recording."""
 
+MEDIAN = 0.6745
+"""Median of the absolute value of a standard normal variable."""
+
 AROUND = 3.0
 """Length of the stretches before and after a reading from which the levels follow, in longest shocks: of what is
 shorter than half of a stretch, its median knows nothing."""
@@ -121,7 +124,7 @@ def _shaken(values: Floats, sigma: float, longest: float) -> Bools:
     ----------
     values : (n,) array
     sigma : float
-        Standard deviation of the noise.
+        Standard deviation of the noise; vibrations that last count as noise.
     longest : float
         Longest shock in samples, at least 1.
     """
@@ -130,7 +133,9 @@ def _shaken(values: Floats, sigma: float, longest: float) -> Bools:
     level = median_filter(values, width, mode="nearest")
     place = np.arange(len(values))
     earlier, before, after, later = (level[np.clip(place + k * apart, 0, len(level) - 1)] for k in (-2, -1, 1, 2))
+    bend = (before + after - earlier - later) / 6.0  # by the cubic through all four, from the mean of the inner ones
+    scale = max(sigma, float(np.median(np.abs(values - 0.5 * (before + after) - bend))) / MEDIAN)
     outside = np.maximum(values - np.maximum(before, after), np.minimum(before, after) - values)
-    bend = np.abs(before + after - earlier - later) / 6.0  # between the levels, by the cubic through all four
     bound = float(stats.norm.isf(0.5 * LEVEL / len(values))) * np.sqrt(1.0 + 0.5 * np.pi / width)
-    return np.asarray(outside > bound * sigma + bend)
+    shaken = outside > bound * scale + np.abs(bend)
+    return np.asarray(shaken & (place >= 2 * apart) & (place < len(values) - 2 * apart))

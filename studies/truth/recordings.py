@@ -58,7 +58,8 @@ Spoiling = Callable[[Table, Array, np.random.Generator], None]
 class Sensors:
     """White noise per sample and sampling of the recordings; a period of None leaves the sensor out.
 
-    With a positive delay the sample stamped t shows the past.
+    With a positive delay the sample stamped t shows the past. With a jitter samples are taken, and stamped, earlier or
+    later than evenly by up to that share of their period, alike for sensors of one period.
     """
 
     rate_sigma: float = 1e-5
@@ -73,6 +74,7 @@ class Sensors:
     rate_delay: float = 0.0
     accel_delay: float = 0.0
     encoder_delay: float = 0.0
+    jitter: float = 0.0
 
 
 def by_axis(family: str, names: Iterable[str], values: Array) -> Table:
@@ -90,10 +92,17 @@ def sample_times(duration: float, sensors: Sensors) -> dict[str, Array]:
     periods = {"position": sensors.encoder_period, "rate": sensors.rate_period, "accel": sensors.accel_period}
     periods["attitude"] = sensors.attitude_period
     return {
-        name: np.round(np.arange(int(duration / period + 1e-9) + 1) * period, 9)
+        name: np.round(_instants(int(duration / period + 1e-9) + 1, sensors.jitter) * period, 9)
         for name, period in periods.items()
         if period is not None
     }
+
+
+def _instants(count: int, jitter: float) -> Array:
+    """Instants in periods, of which the first and the last are on time."""
+    instants = np.arange(count, dtype=float)
+    instants[1:-1] += jitter * np.random.default_rng(count).uniform(-1.0, 1.0, max(count - 2, 0))
+    return instants
 
 
 def delayed(times: Array, sensors: Sensors) -> dict[str, Array]:
