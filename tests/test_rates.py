@@ -1,5 +1,6 @@
 """One flight recorded at 10 and at 1,000 Hz with noise per root hertz alike."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
-from bayesid.diagnosis import diagnose
+from bayesid.diagnosis import Status, diagnose
 from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -17,7 +18,10 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
+from studies.truth.hidden_causes import causes as hide
+from studies.truth.hidden_causes.catalogue import Build, Case, hidden_case
 from tests.conftest import PLANAR, POINT
+from tests.hidden import diagnosed
 
 pytestmark = pytest.mark.slow
 
@@ -119,3 +123,56 @@ def test_a_verdict_is_the_same_at_any_rate(hidden, late):
         assert (fast.verdict.status, fast.verdict.causes) == (slow.verdict.status, slow.verdict.causes)
         for name, probability in slow.probabilities.inclusion.items():
             assert fast.probabilities.inclusion[name] == pytest.approx(probability, abs=0.02), name
+
+
+FAST_RATE = 60.0
+LOUDER = float(np.sqrt(FAST_RATE / 2.0))  # noise per root hertz is that at 2 Hz
+JITTERED = {
+    **{f"{sensor}_period": 1.0 / FAST_RATE for sensor in ("rate", "accel", "encoder")},
+    "rate_sigma": 1e-5 * LOUDER,
+    "accel_sigma": 1e-5 * LOUDER,
+    "encoder_sigma": 1e-6 * LOUDER,
+    "jitter": 0.3,
+}
+TWO = {"count": 2, "duration": 70.0}
+
+
+def jumping(draw: np.random.Generator, strength: float) -> hide.Options:
+    """Mass that moves within the base by 0.3 m in a tenth of a second, once in each recording."""
+    body = mj.Body(6.0, hide.direction(draw, 0.4), 0.01 * np.eye(3))
+    starts = tuple((0.5 * draw.integers(40, 100, 2) + draw.uniform(0.05, 0.35, 2)).tolist())
+    mover = mj.Mover(body, hide.triple(hide.direction(draw)), 0.3 * strength, starts[0], hide.JUMP, starts)
+    return {"hidden": mj.Hidden(movers=[mover])}
+
+
+def fast_case(name: str, *builds: Build, **options: Any) -> Case:
+    """A case in jittered telemetry of 60 Hz."""
+    return hidden_case(name, *builds, sensors=JITTERED, manoeuvres=TWO, latitudes=[0.4, 2.9], **options)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_mass_that_moves_is_named_in_fast_telemetry(tmp_path, seed):
+    """Gyro and accelerometer read thousands of standard deviations while it moves: the verdict was unknown."""
+    result = diagnosed(fast_case("mass-shift", jumping).make(tmp_path, seed))
+    assert result.verdict.status is Status.EXPLAINED
+    assert result.verdict.causes == ("mass-shift",)
+
+
+def test_play_is_named_in_fast_telemetry(tmp_path):
+    """The encoder leaps in less than a tenth of a second; its leap was sought 0.1 s too early and five times too short.
+
+    At both ends the joint of the truth creeps to the middle of its gap, which no mechanism of the effect does: whether
+    something is left beside the play is open.
+    """
+    case = fast_case("joint-backlash:joint2", partial(hide.backlash, "joint2"), flown=0.05)
+    result = diagnosed(case.make(tmp_path, 1))
+    assert result.verdict.causes == ("joint-backlash:joint2",)
+    assert result.cause_probability("joint-backlash:joint2") > 0.99
+    (row,) = [row for row in result.to_dict()["candidates"] if row["name"] == "joint-backlash:joint2"]
+    assert row["amplitude"]["gap"]["mean"] == pytest.approx(6e-4, rel=0.2)
+
+
+def test_fast_telemetry_without_a_cause_is_adequate(tmp_path):
+    assert (
+        diagnosed(fast_case("null", status="adequate", flown=0.05).make(tmp_path, 1)).verdict.status is Status.ADEQUATE
+    )

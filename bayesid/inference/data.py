@@ -23,7 +23,7 @@ from bayesid.recording.full_rate import spikes
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.lattice import lattice_step, mean_deviation
 from bayesid.recording.recording import Recording
-from bayesid.recording.shocks import ShakenSensor, Shock, shocks
+from bayesid.recording.shocks import ShakenSensor, Shock, outside, shocks
 from bayesid.recording.wheel_motion import WheelMotion, check_wheels
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Grid, TimeTables
@@ -358,7 +358,7 @@ class RecordedSamples:
         for sensor in model.sensors:
             kind = sensor.kind
             stamps, values = recorded[kind]
-            quiet = ~np.any([shock.holds(stamps) for shock in shaken], axis=0) if shaken else slice(None)
+            quiet = outside(shaken, stamps)
             stamps, values = stamps[quiet], values[quiet]
             if kind.is_difference and Blocks.of(stamps, per_second).reduced:
                 sigma = sensor.noise.sigma(float(np.median(np.diff(stamps))))

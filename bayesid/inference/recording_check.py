@@ -18,6 +18,7 @@ from bayesid.recording.full_rate import ChannelSpectrum, channel_spectrum, spike
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import whirling_rate
 from bayesid.recording.recording import JOINT_FAMILIES, WHEEL_SPEED, Recording
+from bayesid.recording.shocks import Shock, outside
 from bayesid.recording.suspect_readings import SuspectReadings, suspect_readings
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
@@ -142,6 +143,8 @@ class RecordingCheck:
         Readings that no sensor gives.
     whirling : pair of str and float or None
         Column of the base's rate and its median size [rad/s] where that is unusually fast.
+    shocks : tuple of Shock
+        Times within which all inertial sensors are shaken, whose readings are omitted.
     """
 
     name: str
@@ -155,6 +158,7 @@ class RecordingCheck:
     suspects: tuple[SuspectReadings, ...] = ()
     spectra: tuple[ChannelSpectrum, ...] = ()
     whirling: tuple[str, float] | None = None
+    shocks: tuple[Shock, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -165,6 +169,11 @@ class RecordingCheck:
             sentences.append(
                 f"Half of the readings of {column} exceed {speed:.3g} rad/s, which is unusual: are they in rad/s?"
             )
+        sentences += [
+            f"From {shock.begin:.6g} to {shock.end:.6g} s all inertial sensors are shaken, as by a mass that moves "
+            "inside the base: these readings are omitted."
+            for shock in self.shocks
+        ]
         sentences += [remark for spectrum in self.spectra for remark in spectrum.remarks]
         sentences += [
             f"Joint {joint.name} moves by only {joint.highest - joint.lowest:.2g} {joint.unit}."
@@ -248,6 +257,7 @@ def _check(posterior: Posterior, index: int, predicted: PredictedReadings) -> Re
         suspects=tuple(suspect_readings(recording)),
         spectra=_spectra(posterior, index),
         whirling=whirling_rate(recording),
+        shocks=posterior.data.recorded[index].shocks,
     )
 
 
@@ -257,6 +267,8 @@ def _spectra(posterior: Posterior, index: int) -> tuple[ChannelSpectrum, ...]:
     for kind in posterior.model.channels.kinds:
         if kind.is_difference:
             (time, values), blocks = data.samples_of(index, kind), len(data.measured(index, kind)[0])
+            quiet = outside(data.recorded[index].shocks, time)
+            time, values = time[quiet], values[quiet]
             levels = data.sigma_per_sample(index, kind)
             for name, column, level in zip(kind.components, values.T, levels, strict=True):
                 gone, _ = spikes(column, float(level))

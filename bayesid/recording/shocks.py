@@ -21,7 +21,7 @@ from scipy.ndimage import median_filter
 
 from bayesid._math.arrays import Bools, Floats
 
-__all__ = ["ShakenSensor", "Shock", "shocks"]
+__all__ = ["ShakenSensor", "Shock", "outside", "shocks"]
 
 HALF_PERIOD = 2.5
 """Longest shock in blocks: half a period of the fastest motion that the blocks resolve, which has five of them."""
@@ -105,6 +105,18 @@ def shocks(sensors: Sequence[ShakenSensor], blocks_per_second: float) -> list[Sh
     borders = [-np.inf, *(edge for one in found for edge in one), np.inf]
     quiet = np.diff(borders)[::2] > ISOLATED * longest
     return [one for k, one in enumerate(found) if quiet[k] and quiet[k + 1] and one.end - one.begin <= longest]
+
+
+def outside(some: Sequence[Shock], time: Floats) -> Bools:
+    """Return which times (n,) are in none of some shocks.
+
+    Parameters
+    ----------
+    some : sequence of Shock
+    time : (n,) array
+        Times [s].
+    """
+    return ~np.any([np.zeros(len(time), dtype=bool), *(shock.holds(time) for shock in some)], axis=0)
 
 
 def _disturbances(sensor: ShakenSensor, longest: float) -> list[Shock]:

@@ -42,7 +42,8 @@ class MassShift(Effect):
     The motion of the mass itself is omitted. While it moves, it turns the base by about ``m a x (b - a)`` divided by
     the inertia, where a and b are measured from the common centre of mass; the speed of the mass does not matter. On a
     rotating base this angle changes the subsequent rates by as much as the moments do. If only the rate is measured, a
-    pulse of torque at the same instant can represent it. The shock on an accelerometer is also omitted.
+    pulse of torque at the same instant can represent it. The shock on gyro and accelerometer while it moves is also
+    omitted: readings of fast sensors within it are left out of the data (`bayesid.recording.shocks`).
 
     Parameters
     ----------
