@@ -6,9 +6,13 @@ import jax
 import numpy as np
 import pytest
 
+from bayesid.inference.data import RecordedSamples
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.time_grid import build_grid
 from studies.truth import mujoco as mj
@@ -57,3 +61,31 @@ def test_an_error_of_position_turns_base_and_momentum(joint, formula_motion):
     for columns in (slice(0, 3), slice(3, 6), slice(6, 9)):
         # the motion of the base since the error began is left out, a part of its rate times the duration
         np.testing.assert_allclose(changed[columns], expected[columns], atol=0.06 * np.abs(expected[columns]).max())
+
+
+def test_the_covariance_of_means_over_blocks_is_that_of_the_instants_that_predict_them():
+    """Beside a jump of the acceleration that at the middle of a block may be a hundred times too small."""
+    rng, times, noise = np.random.default_rng(5), np.arange(0.0, 12.0, 1.0 / 60.0), 5e-6
+    bent = 0.05 * np.clip(times - 6.17, 0.0, None) ** 2  # the acceleration jumps
+    channels = {f"position.joint{index + 1}": bent + noise * rng.normal(size=len(times)) for index in range(2)}
+    channels |= {f"rate.{axis}": 1e-4 * rng.normal(size=len(times)) for axis in "xyz"}
+    recording = Recording("flight", None, times, channels)
+    robot = Robot.from_urdf(PLANAR)
+    motion = MeasuredMotion.from_recording(recording, robot, sigma={0: noise})
+    model = Model(robot, (Sensor(SensorKind.RATE, White(1e-4)),), ())
+    samples = RecordedSamples.of(model, Manoeuvre(recording, motion))
+    lags = 3
+    found = samples.motion_covariance(motion, lags)
+    node, weight = samples.average("rate")
+    for row in range(40, 80):
+        for lag in range(lags + 1):
+            expected = np.zeros((2, 3, 3))
+            for i in range(2):
+                for j in range(2):
+                    now, before = samples.nodes[node[row, i]], samples.nodes[node[row - lag, j]]
+                    pair = motion.lag_covariance(np.sort([before, now]), 1)[:, 1 if now != before else 0, 1]
+                    pair = np.swapaxes(pair, -1, -2) if now < before else pair
+                    expected += weight[row, i] * weight[row - lag, j] * pair
+            np.testing.assert_allclose(found[:, lag, row], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+    at_middle = motion.lag_covariance(samples.time, 0)[:, 0, :, 2, 2]
+    assert (found[:, 0, :, 2, 2] / at_middle).max() > 10.0

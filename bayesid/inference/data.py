@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import jax.numpy as jnp
 import numpy as np
@@ -507,11 +508,38 @@ class RecordedSamples:
         errors = []
         if isinstance(self.motion, MeasuredMotion) and robot.joints:
             sensitivity = joint_sensitivity(robot, state, seen, self.sensors, torques)
-            errors.append(MotionErrors(sensitivity, self.motion.lag_covariance(self.time, lags)))
+            errors.append(MotionErrors(sensitivity, self.motion_covariance(self.motion, lags)))
         if self.wheels.is_uncertain:
             slopes = wheel_sensitivity(robot, state, seen, self.sensors, torques)
             errors.append(wheel_errors(self.wheels, self.time, seen.rate, slopes, lags))
         return SampleNoise(self.time, channels, errors)
+
+    def motion_covariance(self, motion: MeasuredMotion, lags: int) -> Floats:
+        """Return the covariances of `MeasuredMotion.lag_covariance` for the means over the blocks.
+
+        Where an acceleration may jump, what is known of it differs by orders of magnitude within a block, so that the
+        covariance at the middle is not that of the mean.
+
+        Parameters
+        ----------
+        motion : MeasuredMotion
+        lags : int
+            Largest distance in rows.
+        """
+        node, weight = self.average(next(iter(self.blocks)))
+        instants = self.nodes[node].ravel()
+        if not self.reduced or (np.diff(instants) < 0.0).any():  # blocks of several sensors overlap
+            return motion.lag_covariance(self.time, lags)
+        between = motion.lag_covariance(instants, 2 * lags + 1)
+        mean = np.zeros((len(between), lags + 1, len(node), *between.shape[3:]))
+        for lag, one, other in product(range(lags + 1), range(2), range(2)):
+            shares = (weight[lag:, one] * weight[: len(weight) - lag, other])[:, None, None]
+            places = 2 * lag + one - other
+            if places >= 0:
+                mean[:, lag, lag:] += shares * between[:, places, 2 * lag + one :: 2]
+            else:  # the second node of a block is later than its first
+                mean[:, lag, lag:] += shares * np.swapaxes(between[:, 1, 1::2], -1, -2)
+        return mean
 
     def _noise_channels(self, sensor: Sensor) -> list[NoiseChannel]:
         """Return the noise of every axis of a sensor."""
