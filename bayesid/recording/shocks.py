@@ -93,18 +93,18 @@ def shocks(sensors: Sequence[ShakenSensor], blocks_per_second: float) -> list[Sh
     longest = HALF_PERIOD / blocks_per_second if blocks_per_second > 0.0 else 0.0
     if len(sensors) < 2 or any(sensor.interval > longest for sensor in sensors):
         return []
-    found = _disturbances(sensors[0], longest)
+    common = _disturbances(sensors[0], longest)
     for sensor in sensors[1:]:
         margin = max(sensor.interval, sensors[0].interval)
-        found = [
+        common = [
             Shock(min(one.begin, other.begin), max(one.end, other.end))
-            for one in found
+            for one in common
             for other in _disturbances(sensor, longest)
             if other.begin < one.end + margin and one.begin < other.end + margin
         ]
-    borders = [-np.inf, *(edge for one in found for edge in one), np.inf]
+    borders = [-np.inf, *(edge for one in common for edge in one), np.inf]
     quiet = np.diff(borders)[::2] > ISOLATED * longest
-    return [one for k, one in enumerate(found) if quiet[k] and quiet[k + 1] and one.end - one.begin <= longest]
+    return [one for k, one in enumerate(common) if quiet[k] and quiet[k + 1] and one.end - one.begin <= longest]
 
 
 def outside(some: Sequence[Shock], time: Floats) -> Bools:
