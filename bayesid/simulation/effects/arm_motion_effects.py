@@ -188,7 +188,7 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
         """Return the displacements by the deflection under the joint's torque, and by its derivatives."""
         index, state = self.index_in(robot), motion.evaluate(time)
-        deflection = Deflection(robot, motion, index, float(time[-1]))
+        deflection = Deflection(robot, motion, index, float(time.max()))
         motions = []
         for order in (0, 2, 1):
             for sign in (-1.0, 1.0):

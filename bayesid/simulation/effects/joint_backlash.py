@@ -115,7 +115,7 @@ class JointBacklash(DisplacedMotion, OnJoint):
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
         """Return the displacements of the link per gap of each kind, as central differences."""
         index, state = self.index_in(robot), motion.evaluate(time)
-        deflection = Deflection(robot, motion, index, float(time[-1]))
+        deflection = Deflection(robot, motion, index, float(time.max()))
         speed = _Speed.of(motion, index, *deflection.span)
         # the link rests until the motor, which has this acceleration, has crossed the gap
         times = [(2.0 * TYPICAL_GAP / turn.slope) ** 0.5 for turn in speed.turns]
@@ -152,12 +152,12 @@ def _reversals(times: Floats, course: Floats, least: float) -> tuple[float, list
     loaded = np.flatnonzero(np.abs(course) > least * np.abs(course).max(initial=0.0))
     if not len(loaded):
         return 0.0, []
-    changes = []
-    for before, after in pairwise(loaded):
-        if np.sign(course[after]) != np.sign(course[before]):
-            slope = abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
-            changes.append(_Reversal(times[after] - abs(course[after]) / slope, slope, float(np.sign(course[after]))))
-    return float(np.sign(course[loaded[0]])), changes
+    signs = np.sign(course[loaded])
+    after = loaded[1:][signs[1:] != signs[:-1]]
+    slopes = np.abs(course[after] - course[after - 1]) / (times[after] - times[after - 1])
+    zeros = times[after] - np.abs(course[after]) / slopes
+    changes = [_Reversal(*map(float, each)) for each in zip(zeros, slopes, np.sign(course[after]), strict=True)]
+    return float(signs[0]), changes
 
 
 def _across(time: Floats, crossing: _Reversal, lasts: float, power: int) -> Floats:
