@@ -240,7 +240,7 @@ POWERS = {  # effect -> unit -> powers of mass and of length; panels' area goes 
     "thruster-leak": {"N": (1, 0), "N m": (1, 1)},
     "rotational-drag": {"N m s": (1, 2)},
     "wheel-momentum": {"N m s": (1, 1)},
-    "wheel-history:z": {"N m s": (1, 1)},
+    "wheel-history:z": {"N m s": (1, 1), "N m": (1, 1)},
     "flexible-appendage": {"sqrt(kg)": (0.5, 0), "sqrt(kg) m": (0.5, 1)},
     "fuel-slosh": {"kg": (1, 0)},
     "mass-shift": {"kg m": (1, 1), "kg m2": (1, 2)},
@@ -416,7 +416,9 @@ def hidden_sizes(case: Case, seed: int) -> dict[str, dict[str, float]]:
             omega, damping = 2.0 * np.pi * hidden.flexible[0].frequency, hidden.flexible[0].damping
             found[name] = {"s2": omega**-2, "s3": 2.0 * damping * omega**-3}
         elif kind == "wheel-history":
-            found[name] = {"N m s": largest_of(hidden.fields[0].momentum)}
+            wheel = hidden.fields[0]
+            torques = np.diff(wheel.momentum) / np.diff(wheel.times)
+            found[name] = {"N m s": largest_of(wheel.momentum), "N m": largest_of(torques)}
         elif kind == "accel-position":
             found[name] = {"m": largest_of(options["declared_offset"])}
     for name, vector in case.amplitudes(seed).items():

@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis import Status
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import WheelHistory, WheelMomentum, create
-from bayesid.simulation.effects.wheel_history import KNOTS
+from bayesid.simulation.effects.wheel_history import KNOTS, RUN_UP
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 from studies.truth.bodies import SERVICER3
+from studies.truth.hidden_causes.catalogue import hidden_case
+from tests.hidden import diagnosed
 from tests.simulated import simulated
 
 END, TIMES = 46.0, np.arange(0.0, 60.01, 0.5)
 TURNS = np.linspace(0.0, END, KNOTS)
 MOMENTUM = np.random.default_rng(3).uniform(-0.6, 0.6, KNOTS)
+PARAMETERS = np.concatenate([MOMENTUM[:1], np.diff(MOMENTUM) / TURNS[1]])
 POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)
 MOTION = mj.smooth_motion(3, 60.0, 5, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
 
@@ -38,7 +42,7 @@ def test_the_history_is_that_of_pinocchio(axis, formula_motion):
     truth = ref.simulate(SERVICER3, MOTION, TIMES, 0.05, wheel=wheel, **options)
     robot = Robot.from_urdf(SERVICER3)
     motion = formula_motion(MOTION, SERVICER3, robot)
-    found = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory(axis, end=END), MOMENTUM)
+    found = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory(axis, end=END), PARAMETERS)
     without = simulated(robot, motion, TIMES, RATE0, POINT)
     for given, bare, exact in zip(found, without, (truth.rate, truth.accel, truth.attitude), strict=True):
         assert np.abs(given - exact).max() < 1e-5 * np.abs(bare - exact).max()
@@ -48,18 +52,44 @@ def test_the_history_is_that_of_pinocchio(axis, formula_motion):
 def test_a_constant_history_is_a_wheel_momentum(formula_motion):
     robot = Robot.from_urdf(SERVICER3)
     motion = formula_motion(MOTION, SERVICER3, robot)
-    history = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory("y"), np.full(KNOTS, 0.4))
+    history = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory("y"), np.array([0.4] + (KNOTS - 1) * [0.0]))
     constant = simulated(robot, motion, TIMES, RATE0, POINT, WheelMomentum(), np.array([0.0, 0.4, 0.0]))
     for left, right in zip(history, constant, strict=True):
         np.testing.assert_allclose(left, right, atol=1e-14)
 
 
-def test_bound_and_prior_are_those_of_a_wheel():
+def test_the_momenta_at_the_knots_are_reported():
+    effect = WheelHistory("x", end=END)
+    np.testing.assert_allclose(effect.report(PARAMETERS), MOMENTUM, atol=1e-12)
+    assert [quantity.name for quantity in effect.quantities] == [f"momentum.{knot}" for knot in range(1, KNOTS + 1)]
+    assert {quantity.unit for quantity in effect.quantities} == {"N m s"}
+
+
+def test_bound_and_prior_are_those_of_a_wheel_and_of_its_motor():
     robot = Robot.from_urdf(SERVICER3)
     model = Model(robot, (Sensor(SensorKind.RATE, White(1e-5)),), ())
-    assert WheelHistory("x").physical_bounds(model) == WheelMomentum().physical_bounds(model)
-    assert {p.sigma for p in WheelHistory("x").parameters} == {p.sigma for p in WheelMomentum().parameters}
+    momentum, torque = WheelHistory("x").physical_bounds(model)
+    assert (momentum,) == WheelMomentum().physical_bounds(model)
+    assert (torque.unit, torque.largest) == ("N m", momentum.largest / RUN_UP)
+    assert WheelHistory("x").parameters[0].sigma == WheelMomentum().parameters[0].sigma
     assert [effect.label for effect in WheelHistory.instances(model)] == [f"wheel-history:{axis}" for axis in "xyz"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "seed"), [(0.1, 12), (0.5, 14)])
+def test_a_wheel_that_hardly_changes_is_named(share, seed, tmp_path):
+    """It is charged for what it changes: with 24 independent values both were unknown, with 0.7 and more."""
+
+    def wandering(draw, strength):
+        levels = 0.02 * (1.0 + share * np.concatenate([[0.0], np.cumsum(draw.uniform(-1.0, 1.0, 3))]))
+        wheel = mj.SpunWheel(np.array([0.0, 0.0, 1.0]), np.array([0.0, 60.0, 120.0, 200.0]), strength * levels)
+        return {"hidden": mj.Hidden(fields=[wheel])}
+
+    verdict = diagnosed(
+        hidden_case("wheel-history:z", wandering).make(tmp_path, seed, 0.6 if share < 0.2 else 1.0)
+    ).verdict
+    assert verdict.status is Status.EXPLAINED
+    assert verdict.causes == ("wheel-history:z",)
 
 
 def test_it_needs_an_axis_and_a_length():

@@ -74,7 +74,7 @@ class RivalPrior:
         units = [quantity.unit for quantity in effect.amplitude_quantities]
         is_body = effect.amplitude_units == tuple(POWERS)
         scale_of = np.zeros(len(units), dtype=int)
-        spreads = np.ones((1, len(units)))
+        spreads = np.array(effect.amplitude_shapes)
         if is_body:
             spreads = np.array([[reach ** POWERS[unit] for unit in units] for reach in MOMENT_REACHES])
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -78,8 +78,8 @@ class LinearCause(CauseKind):
             by_unit = _of_recordings(effect, next(responses))
             signatures |= {items[0].name: items for items in by_unit.values()}
             if sizes:
-                group = tuple(AmplitudeGroup(items[0].name, sizes[unit]) for unit, items in by_unit.items())
-                causes.append(CandidateCause(effect.label, group))
+                first, *more = _forms(effect, by_unit, sizes)
+                causes.append(CandidateCause(effect.label, first, others=tuple(more)))
             else:
                 (items,) = by_unit.values()
                 causes.append(CandidateCause(effect.label, (AmplitudeGroup(items[0].name, 1.0),), fixed=True))
@@ -105,8 +105,12 @@ class LinearCause(CauseKind):
         """Return the mean amplitudes by the linear model, recording after recording where each has its own."""
         if effect.in_amplitudes() is not effect or not effect.parameters:
             return effect.starts
-        mean = point.mean_amplitudes(effect.label, names)
-        return [mean / np.resize([parameter.sigma for parameter in effect.parameters], mean.shape)]
+        by_unit = point.mean_amplitudes(effect.label, names)
+        sigma = np.resize([parameter.sigma for parameter in effect.parameters], by_unit.shape)
+        units = np.resize([parameter.unit for parameter in effect.parameters], by_unit.shape)
+        mean = np.zeros_like(by_unit)
+        mean[np.concatenate([np.flatnonzero(units == unit) for unit in effect.amplitude_units])] = by_unit
+        return [mean / sigma]
 
     def quantities(self, effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
         """Return the amplitudes of effects, those of one unit together."""
@@ -194,6 +198,22 @@ def group_names(effect: Effect) -> dict[str, str]:
     if units == MOMENT_UNITS:
         return dict.fromkeys(units, f"moments of {effect.link}")
     return {unit: f"{effect.label} [{unit}]" if len(units) > 1 else effect.label for unit in units}
+
+
+def _forms(
+    effect: Effect, by_unit: Mapping[str, Sequence[Signatures]], sizes: Mapping[str, float]
+) -> list[tuple[AmplitudeGroup, ...]]:
+    """Return the groups of an effect in each form of its prior."""
+    units = np.array([quantity.unit for quantity in effect.amplitude_quantities])
+    forms = []
+    for shape in np.array(effect.amplitude_shapes):
+        groups = []
+        for unit, items in by_unit.items():
+            count = sum(item.columns.shape[1] for item in items)
+            spread = np.resize(shape[units == unit] ** 2, count)
+            groups.append(AmplitudeGroup(items[0].name, sizes[unit], spread=spread))
+        forms.append(tuple(groups))
+    return forms
 
 
 def _moments(perturbed: PerturbedModel, fit: Fit, effect: Effect) -> Floats:

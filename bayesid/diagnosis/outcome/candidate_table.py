@@ -97,7 +97,7 @@ def candidate_table(search: ModelSearch, effects: Sequence[Effect], rng: np.rand
         groups = [group.name for group in cause.variants[evidence.forms([name])[name]].groups]
         amplitude: _Amplitudes = ((), np.zeros(0), np.zeros(0), np.zeros(0))
         if name in quantities and not cause.fixed:
-            amplitude = _amplitudes(name, groups, evidence, quantities[name])
+            amplitude = listed_amplitudes(name, groups, evidence, quantities[name])
         local, adjusted = np.exp(p_values[name]).tolist()
         rows.append(
             Candidate(
@@ -124,12 +124,25 @@ _Amplitudes = tuple[tuple[Quantity, ...], Floats, Floats, Floats]
 """Quantities of one candidate, with their means, standard deviations and upper limits."""
 
 
-def _amplitudes(
+def listed_amplitudes(
     name: str, groups: Sequence[str], evidence: SetEvidence, quantities: tuple[Quantity, ...]
 ) -> _Amplitudes:
+    """Return the amplitudes by which a candidate is listed, those of the first recording where each has its own.
+
+    Parameters
+    ----------
+    name : str
+    groups : sequence of str
+        Its groups of columns, one for each unit, or one for all.
+    evidence : SetEvidence
+    quantities : tuple of Quantity
+        What is listed, by unit.
+    """
     posterior = AmplitudePosterior.of(evidence, [name])
-    places = np.concatenate([posterior.amplitudes[name, group] for group in groups])
-    first = places[: len(quantities)]  # of a cause per recording, those of the first
+    units = [quantity.unit for quantity in quantities]
+    counts = [units.count(unit) for unit in dict.fromkeys(units)] if len(groups) > 1 else [len(units)]
+    # within each group, the columns of the first recording come first
+    first = np.concatenate([posterior.amplitudes[name, group][:n] for group, n in zip(groups, counts, strict=False)])
     sd = np.sqrt(np.diag(posterior.covariance)[first])
     return quantities, posterior.mean[first], sd, posterior.upper_limits()[first]
 

@@ -230,6 +230,14 @@ class Effect:
         return tuple(dict.fromkeys(quantity.unit for quantity in self.amplitude_quantities))
 
     @property
+    def amplitude_shapes(self) -> Sequence[Sequence[float]]:
+        """Standard deviations of `amplitude_quantities` relative to their scales, in equally probable forms of a prior.
+
+        By default there is one form, in which all are one.
+        """
+        return [[1.0] * len(self.amplitude_quantities)]
+
+    @property
     def _amplitudes(self) -> list[Parameter]:
         linear = self.in_amplitudes()
         pairs = zip(linear.parameters, linear.absent, strict=True)

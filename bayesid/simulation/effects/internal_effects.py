@@ -58,6 +58,9 @@ They are assumed: for a base of 3 t and 5 m they give more than twice what four 
 of 4 kg and 0.3 m what four small ones of 15 mN m s do.
 """
 
+ALIGNED = 0.01
+"""Angle between a base axis and a wheel that is mounted along it [rad]; assumed."""
+
 APPENDAGES = 0.1
 """Mass of all panels, booms and antennas that swing, relative to the robot's; assumed."""
 
@@ -90,6 +93,12 @@ class WheelMomentum(Effect):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
         return (wheel_bound(model.robot),)
+
+    @property
+    def amplitude_shapes(self) -> Sequence[Sequence[float]]:
+        """Any direction, or about one axis of the base: of one wheel, or of several if only one of them turns."""
+        along = np.where(np.eye(3) > 0.0, 1.0, ALIGNED)
+        return [[1.0, 1.0, 1.0], *along.tolist()]
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum of the wheels, and a zero derivative."""

@@ -13,7 +13,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Quantity
 from bayesid.simulation.effects.internal_effects import wheel_bound
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
@@ -22,7 +22,11 @@ from bayesid.simulation.instant import Instant
 __all__ = ["KNOTS", "WheelHistory"]
 
 KNOTS = 24
-"""Number of instants at which the momentum is a parameter."""
+"""Number of instants between which the momentum is linear."""
+
+RUN_UP = 0.1
+"""Time in which the fastest motors bring their wheels to full speed [s]: small ones that drive propellers; reaction
+wheels take from some seconds to several minutes. Assumed."""
 
 AXES = "xyz"
 
@@ -36,6 +40,11 @@ class WheelHistory(Placed):
     last knot; the data do not determine knots after the end of a recording. The reaction torque on the base is minus
     the slope of the momentum. For a momentum that is the same in all recordings, use `WheelMomentum`.
 
+    The parameters are the momentum at the first knot and the torques of the motor between the knots, since a motor
+    changes a momentum gradually: with independent torques the momentum is a random walk from any start. In a diagnosis
+    the start has one scale and the torques have another, so that a wheel whose speed hardly changes is not charged for
+    24 independent values. The momenta at all knots are reported.
+
     If the momentum of the wheels is recorded, the effect is the difference between true and recorded momentum.
 
     Parameters
@@ -45,7 +54,9 @@ class WheelHistory(Placed):
     end : float
         Time of the last knot [s], best the length of the longest recording.
     sigma : float
-        Standard deviation of the prior of each value [N m s].
+        Standard deviation of the prior of the momentum at the first knot [N m s].
+    torque : float
+        Standard deviation of the prior of each torque of the motor [N m].
     """
 
     name = "wheel-history"
@@ -60,7 +71,7 @@ class WheelHistory(Placed):
     per_recording: ClassVar[bool] = True
     constant_names = ("end",)
 
-    def __init__(self, place: str = "", end: float = 230.0, sigma: float = 1.0) -> None:
+    def __init__(self, place: str = "", end: float = 230.0, sigma: float = 1.0, torque: float = 0.1) -> None:
         axis, _, stated = place.partition(",")
         super().__init__(axis)
         self.end = float(stated) if stated else end
@@ -68,7 +79,10 @@ class WheelHistory(Placed):
             raise InputError(
                 f"{self.label}: the last knot is at {self.end:g} s", remedy="Give the length of the recordings"
             )
-        self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
+        self.parameters = (
+            Parameter("momentum.1", "N m s", sigma),
+            *(Parameter(f"torque.{piece}", "N m", torque) for piece in range(1, KNOTS)),
+        )
 
     @classmethod
     def instances(cls, model: Situation) -> Sequence[Effect]:
@@ -96,19 +110,30 @@ class WheelHistory(Placed):
 
     @property
     def knots(self) -> Floats:
-        """Times of the parameters, shape (24,) [s]."""
+        """Instants between which the momentum is linear, shape (24,) [s]."""
         return np.linspace(0.0, self.end, KNOTS)
 
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """Reported quantities: the momenta at the knots."""
+        return [Quantity(f"momentum.{knot}", "N m s") for knot in range(1, KNOTS + 1)]
+
+    def report(self, values: Array) -> Array:
+        """Return the momenta at the knots, shape (24,) [N m s]."""
+        return jnp.cumsum(jnp.concatenate([values[:1], values[1:] * (self.end / (KNOTS - 1))]))
+
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
-        """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
-        return (wheel_bound(model.robot),)
+        """Return the momentum of all wheels of a robot of this mass and size, and the torque that runs them up."""
+        full = wheel_bound(model.robot)
+        torque = f"{full.reason} The fastest motors take {RUN_UP:g} s to full speed."
+        return full, PhysicalBound("N m", full.largest / RUN_UP, torque)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum of the wheels between the knots, and its slope."""
-        spacing = self.end / (KNOTS - 1)
-        knot = jnp.clip(instant.environment.time / spacing, 0.0, KNOTS - 1.0)
-        left = jnp.clip(jnp.floor(knot).astype(int), 0, KNOTS - 2)
-        rise = values[left + 1] - values[left]
-        slope = jnp.where(instant.environment.time < self.end, rise / spacing, 0.0)
+        time, spacing = instant.environment.time, self.end / (KNOTS - 1)
+        piece = jnp.clip(jnp.floor(time / spacing).astype(int), 0, KNOTS - 2)
+        since = jnp.clip(time - piece * spacing, 0.0, spacing)
+        torque = values[1 + piece]
+        slope = jnp.where(time < self.end, torque, 0.0)
         axis = jnp.eye(3)[AXES.index(self.place)]
-        return (values[left] + (knot - left) * rise) * axis, slope * axis
+        return (self.report(values)[piece] + since * torque) * axis, slope * axis
