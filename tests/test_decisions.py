@@ -16,7 +16,7 @@ from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import Status, classes_of_equivalents, probable_verdict, verdict_sensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.outcome.candidate_table import candidate_table
+from bayesid.diagnosis.outcome.candidate_table import candidate_table, listed_amplitudes
 from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.simulation.effects.effect import Quantity
 from tests.gram_problem import LinearProblem
@@ -105,6 +105,34 @@ def test_what_can_only_be_told_apart_beyond_the_bounds_is_one_class():
         pair = [cause("a", factor / apart), cause("b", factor / apart)]
         assert classes_of_equivalents(SetEvidence(gram, pair)) == classes
     assert classes_of_equivalents(SetEvidence(gram, [])) == ()
+
+
+def test_a_cause_of_several_forms_is_equivalent_in_one_of_them():
+    """As a train of pulses is to a leak: the same where it is fast, another where it is slow."""
+    matrix = np.array([[9.0, 9.0, 0.0], [9.0, 9.0, 0.0], [0.0, 0.0, 9.0]])
+    gram = Gram(
+        matrix, np.array([9.0, 9.0, 8.0]), {name: np.array([k]) for k, name in enumerate(("leak", "fast", "slow"))}
+    )
+    leak = CandidateCause("leak", (AmplitudeGroup("leak", 10.0),))
+    train = CandidateCause("train", (AmplitudeGroup("slow", 10.0),), others=((AmplitudeGroup("fast", 10.0),),))
+    evidence = SetEvidence(gram, [leak, train])
+    assert classes_of_equivalents(evidence) == (("leak", "train"),)  # the fast form is the more probable one
+    assert classes_of_equivalents(evidence, forms={"train": 0}) == (("leak",), ("train",))
+
+
+def test_amplitudes_of_several_units_are_listed_for_the_first_recording():
+    """Within each group, the columns of the first recording come first."""
+    rng = np.random.default_rng(1)
+    problem = LinearProblem.random(rng, {"wheel [N m s]": 2, "wheel [N m]": 6}, samples=200)
+    true = {"wheel [N m s]": np.array([1.0, 2.0]), "wheel [N m]": np.array([3.0, 4.0, 5.0, 6.0, 7.0, 8.0])}
+    evidence = SetEvidence(
+        problem.observed(rng, true).gram(),
+        [CandidateCause("wheel", tuple(AmplitudeGroup(name, 100.0) for name in true))],
+    )
+    quantities = tuple(Quantity(*pair) for pair in (("start", "N m s"), ("1", "N m"), ("2", "N m"), ("3", "N m")))
+    listed, mean, sd, _ = listed_amplitudes("wheel", list(true), evidence, quantities)
+    assert listed == quantities
+    np.testing.assert_allclose(mean, [1.0, 3.0, 4.0, 5.0], atol=4.0 * sd.max())
 
 
 @pytest.fixture(scope="module")

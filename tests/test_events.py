@@ -19,6 +19,8 @@ from studies.truth import mujoco as mj
 from studies.truth.bodies import SERVICER3
 from studies.truth.hidden_causes import FURTHER_CASES, Case
 from studies.truth.hidden_causes import causes as hide
+from studies.truth.hidden_causes.catalogue import hidden_case
+from tests.hidden import diagnosed, shortened
 from tests.simulated import simulated
 
 POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)
@@ -135,6 +137,22 @@ def test_what_mujoco_hides_is_named_and_what_remains_is_said(name, tmp_path):
     assert result.remainder.verdict is rest
     assert result.verdict.status is (Status.EXPLAINED if rest is Rest.NONE else Status.PARTLY_EXPLAINED)
     assert result.to_dict()["remainder"]["verdict"] == rest.value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", ["fast train", "leak"])
+def test_a_train_that_is_too_fast_for_the_readings_is_not_called_a_leak_alone(case, tmp_path):
+    """Pulses of half a second every three seconds, and a valve that does not close, both at 2 Hz."""
+
+    def train(draw, strength):
+        torque = hide.direction(draw, 6e-4 * strength)
+        return {"hidden": mj.Hidden(fields=[mj.pulses(torque, every=3.0, length=0.5, start=4.0)])}
+
+    build, strength = (train, 2.0) if case == "fast train" else (hide.leak, 1.5)
+    verdict = diagnosed(shortened(hidden_case("thruster-leak", build)).make(tmp_path, 35, strength)).verdict
+    assert verdict.status is Status.EXPLAINED
+    assert verdict.causes == ("thruster-leak",)
+    assert verdict.equivalent_to == {"thruster-leak": ("thruster-pulses",)}
 
 
 # where two causes part ------------------------------------------------------------------------------------------------

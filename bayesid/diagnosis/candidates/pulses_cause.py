@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
 from bayesid._math.arrays import Floats, log_sum
+from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseAmplitude
 from bayesid.diagnosis.candidates.courses import CourseGram, half_chi2
 from bayesid.diagnosis.candidates.generic_cause import TORQUE
-from bayesid.diagnosis.candidates.linear_model import Linearisation
-from bayesid.diagnosis.candidates.shaped_cause import ShapedCause, ShapeProposal
+from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank
+from bayesid.diagnosis.candidates.shaped_cause import ShapedCause, ShapeProposal, form_of, responses_of
+from bayesid.diagnosis.evidence.scales import CandidateCause
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
+from bayesid.simulation.effects.environment_effects import ThrusterLeak
 from bayesid.simulation.effects.thruster_pulses import PulseTrain, ThrusterPulses
 
 __all__ = ["PulsesCause"]
@@ -38,8 +43,14 @@ in each at a time of its own."""
 MOST_ON = 0.5
 """Largest share of the time that it fires; one that fires longer leaks with pauses."""
 
+SHORTEST = 0.1
+"""Shortest period of a train [s]: valves need some hundredths of a second to open and to close."""
+
 DRIFT = 0.15
 """Step of the period, by which the last pulse in a recording moves so many periods."""
+
+STEADY = (SHORTEST, SHORTEST)
+"""Period and width of the average of fast trains: they thrust all the time."""
 
 BEST = 3
 """Trains of the bank for each of which the whole is tuned: those that gain most."""
@@ -50,6 +61,32 @@ class PulsesCause(ShapedCause):
 
     name = "pulses"
     alone_as_well = True  # a leak with pulses of either sign equals pulses of one sign
+
+    def signatures(
+        self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds
+    ) -> SignatureBank:
+        """Return the bank of a few slow trains, and of the average of those that are too fast for the readings.
+
+        Pulses of one sign in quick succession act like a leak, so that both are one class of equivalents where the
+        data prefer that form. Its share is that of such periods if the period is log-uniform, and half of the trains
+        alternate; alternating pulses in quick succession move nothing.
+        """
+        bank = super().signatures(perturbed, fit, effects, bounds)
+        longest = float(np.asarray(fit.operating.sample.environment.time).max())
+        fast = np.log(longest / FINEST / SHORTEST) / np.log(longest / FEWEST / SHORTEST)
+        share = 0.5 * float(fast)
+        if not effects or share <= 0.0:
+            return bank
+        (columns,) = responses_of(perturbed, fit, [ThrusterLeak()])
+        signatures, causes = list(bank.signatures), list[CandidateCause]()
+        for effect, cause in zip(effects, bank.causes, strict=True):
+            steady = _of(effect).with_train(PulseTrain(*STEADY, False, (0.0,)))
+            items, groups = form_of(f"{effect.label}, fast", steady, columns, bounds[effect.label])
+            signatures += items
+            slow = (1.0 - share) / len(cause.variants)
+            others = (*(variant.groups for variant in cause.variants[1:]), groups)
+            causes.append(replace(cause, others=others, shares=(*[slow] * len(cause.variants), share)))
+        return SignatureBank(tuple(signatures), tuple(causes))
 
     def trials(self, effect: Effect, ends: Floats) -> list[tuple[Effect, bool]]:
         """Return a few trains that begin alike in all recordings."""
@@ -101,6 +138,13 @@ class PulsesCause(ShapedCause):
         if not 0.0 < width < MOST_ON * period:
             return None
         return _of(effect).with_train(PulseTrain(period, width, _of(effect).train.alternating, tuple(first)))
+
+    def instants(self, perturbed: PerturbedModel, fit: Fit, label: str) -> list[CauseAmplitude]:
+        """Return the numbers of the train; none of one that is too fast for the readings to have any."""
+        mine = (effect for effect in fit.effects if effect.cause_kind == self.name and effect.candidate == label)
+        if any(_of(effect).train[:2] == STEADY for effect in mine):
+            return []
+        return super().instants(perturbed, fit, label)
 
     def shape_quantities(self, effect: Effect, names: Sequence[str]) -> list[Quantity]:
         """Return period, width, and the first pulse of each recording."""

@@ -27,7 +27,7 @@ from bayesid.inference.residual_view import by_recording
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import PhysicalBound, Quantity
 
-__all__ = ["ShapeProposal", "ShapedCause"]
+__all__ = ["ShapeProposal", "ShapedCause", "form_of", "responses_of"]
 
 SHARE = 0.5
 """Prior probability of tuned shapes; the rest is that of the forms of the bank."""
@@ -134,14 +134,14 @@ class ShapedCause(CauseKind):
         for effect in effects:
             forms = []
             trials = self.trials(effect, ends)
-            responses = _responses(perturbed, fit, [trial for trial, _ in trials])
+            responses = responses_of(perturbed, fit, [trial for trial, _ in trials])
             for number, ((trial, apart), columns) in enumerate(zip(trials, responses, strict=True)):
                 parts = list(enumerate(by_recording(fit.posterior, columns))) if apart else [(None, columns)]
                 for recording, part in parts:
                     where = "" if recording is None else f" in recording {recording + 1}"
                     one = trial if recording is None else self.of_recording(trial, recording)
                     label = f"{effect.label} #{number + 1}{where}"
-                    parts_of_form, groups = _form(label, one, part, bounds[effect.label])
+                    parts_of_form, groups = form_of(label, one, part, bounds[effect.label])
                     signatures += [replace(signature, recording=recording) for signature in parts_of_form]
                     forms.append(groups)
             causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:])))
@@ -176,8 +176,8 @@ class ShapedCause(CauseKind):
                     continue
                 exact, log_share = tuning
                 label = f"{effect.label} tuned with {' + '.join(causes) or 'nothing'}"
-                (columns,) = _responses(point.perturbed, point.fit, [exact])
-                items, groups = _form(label, self.with_names(exact, names), columns, bounds[effect.label])
+                (columns,) = responses_of(point.perturbed, point.fit, [exact])
+                items, groups = form_of(label, self.with_names(exact, names), columns, bounds[effect.label])
                 bank = SignatureBank((*bank.signatures, *items), bank.causes)
                 forms.append(groups)
                 log_shares.append(log_share)
@@ -224,7 +224,7 @@ class ShapedCause(CauseKind):
             possible = {k: self.with_shape(proposal.effect, trial) for k, trial in enumerate(trials)}
             known = {k: effect for k, effect in possible.items() if effect is not None}
             halves = np.full(len(trials), -np.inf)
-            for k, columns in zip(known, _responses(point.perturbed, point.fit, list(known.values())), strict=True):
+            for k, columns in zip(known, responses_of(point.perturbed, point.fit, list(known.values())), strict=True):
                 gram = left.gram(columns, "trial")
                 halves[k] = half_chi2(gram.matrix, gram.score)
             return halves
@@ -282,7 +282,7 @@ class ShapedCause(CauseKind):
         effect, values = fit.effects[index], fit.values(index)
         numbers, reach = self.shape(effect)
         names = [manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres]
-        here = _responses(perturbed, fit, [effect])[0] @ values
+        here = responses_of(perturbed, fit, [effect])[0] @ values
         numbers_of_shape = []
         for place, quantity in enumerate(self.shape_quantities(effect, names)):
             wide = reach[place] / NARROWER**ROUNDS
@@ -290,7 +290,7 @@ class ShapedCause(CauseKind):
                 steps = wide * np.arange(-POINTS, POINTS + 1) / POINTS
                 moved = [self.with_shape(effect, numbers + step * (np.arange(len(numbers)) == place)) for step in steps]
                 there = np.array([trial is not None for trial in moved])
-                columns = _responses(perturbed, fit, [trial for trial in moved if trial is not None])
+                columns = responses_of(perturbed, fit, [trial for trial in moved if trial is not None])
                 changes = np.stack([moved_columns @ values - here for moved_columns in columns], axis=1)
                 steps = steps[there]
                 cost = fit.residual @ changes + 0.5 * np.diag(fit.project(changes))
@@ -316,7 +316,7 @@ def _with_exact_gains(
     for causes in dict.fromkeys(causes for _, causes, _ in trials):
         left = Remaining.of(point, causes, point.evidence.forms(causes))
         beside = [(total, proposal) for total, others, proposal in trials if others == causes]
-        responses = _responses(point.perturbed, point.fit, [proposal.effect for _, proposal in beside])
+        responses = responses_of(point.perturbed, point.fit, [proposal.effect for _, proposal in beside])
         for (total, proposal), columns in zip(beside, responses, strict=True):
             gram = left.gram(columns, "trial")
             gain = float(half_chi2(gram.matrix, gram.score))
@@ -341,18 +341,38 @@ def _something_left(evidence: SetEvidence, causes: Sequence[str]) -> bool:
     return any(log_sum(list(of_forms.values())) > 0.0 for of_forms in gains.values())
 
 
-def _responses(perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
-    """Return the responses to unit amplitudes of some effects, (N, m) each."""
+def responses_of(perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
+    """Return the responses to unit amplitudes of some effects, (N, m) each.
+
+    Parameters
+    ----------
+    perturbed : PerturbedModel
+    fit : Fit
+    effects : sequence of Effect
+        In fixed shapes.
+    """
     widths = [np.array([parameter.sigma for parameter in effect.parameters]) for effect in effects]
     points = [(effect, np.zeros(len(sigma))) for effect, sigma in zip(effects, widths, strict=True)]
     columns = perturbed.columns_together(points, fit.operating, fit.z, fit.data) if points else []
     return [part / sigma for part, sigma in zip(columns, widths, strict=True)]
 
 
-def _form(
+def form_of(
     name: str, effect: Effect, columns: Floats, bounds: Sequence[PhysicalBound]
 ) -> tuple[list[Signatures], tuple[AmplitudeGroup, ...]]:
-    """Return the signatures of a form and its groups, one for each unit."""
+    """Return the signatures of a form and its groups, one for each unit.
+
+    Parameters
+    ----------
+    name : str
+        Of the form.
+    effect : Effect
+        In this form.
+    columns : (N, m) array
+        Responses to its unit amplitudes.
+    bounds : sequence of PhysicalBound
+        One for each unit.
+    """
     items, groups = [], []
     units = np.array([parameter.unit for parameter in effect.parameters])
     for bound in bounds:

@@ -292,14 +292,17 @@ def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:
 
 
 def classes_of_equivalents(
-    evidence: SetEvidence, seen: float = DEFAULT_SETTINGS.visible_information
+    evidence: SetEvidence,
+    seen: float = DEFAULT_SETTINGS.visible_information,
+    forms: Mapping[str, int] | None = None,
 ) -> tuple[tuple[str, ...], ...]:
     """Return the causes of the catalogue in classes, each sorted, in the order of their first names.
 
-    Two causes are equivalent where neither offers anything visible, at the bounds of its scales, beyond what amplitudes
-    of any size of the other can imitate. A joint effect of two causes is not compared with a third. What the data
-    cannot see at all is equivalent to nothing, and each such cause is a class of its own. A cause joins a class if it
-    is equivalent to every member.
+    A cause of several forms is compared in one of them: a fast train of pulses is the same as a leak, a slow one is
+    not. Two causes are equivalent where neither offers anything visible, at the bounds of its scales, beyond what
+    amplitudes of any size of the other can imitate. A joint effect of two causes is not compared with a third. What the
+    data cannot see at all is equivalent to nothing, and each such cause is a class of its own. A cause joins a class if
+    it is equivalent to every member.
 
     Parameters
     ----------
@@ -307,10 +310,12 @@ def classes_of_equivalents(
     seen : float
         Information on the amplitudes in units of their largest scale, in the most visible direction, from which on the
         data see a difference.
+    forms : mapping of str to int, optional
+        Form in which a cause is compared; by default the most probable one by itself.
     """
     columns, units, directions = {}, {}, {}
     for name in evidence.catalogue:
-        spectra = evidence.spectra([name])
+        spectra = evidence.spectra([name], None if forms is None or name not in forms else {name: forms[name]})
         columns[name] = np.concatenate([spectrum.columns for spectrum in spectra])
         units[name] = np.concatenate([spectrum.root * spectrum.range.high for spectrum in spectra])
         directions[name] = independent_directions(evidence.gram.matrix[np.ix_(columns[name], columns[name])])

@@ -93,8 +93,19 @@ class ModelSearch:
         return probabilities.with_sets(sets)
 
     def classes(self) -> tuple[tuple[str, ...], ...]:
-        """Return the causes in classes of equivalents; a fault of the noise is a class of its own."""
-        classes = classes_of_equivalents(self.searches[0].point.evidence, self.settings.visible_information)
+        """Return the causes in classes of equivalents; a fault of the noise is a class of its own.
+
+        A cause is compared in the form that it has in the most probable set that holds it.
+        """
+        evidence = self.searches[0].point.evidence
+        forms: dict[str, int] = {}
+        for cause_set in self.probabilities.sets:
+            if cause_set.probability < self.settings.matters:
+                break
+            names = [name for name in cause_set.names if name in evidence.causes]
+            for name in (name for name in names if name not in forms):
+                forms[name] = evidence.forms(names)[name]
+        classes = classes_of_equivalents(evidence, self.settings.visible_information, forms)
         members = {name for names in classes for name in names}
         return (*classes, *((name,) for name in self.probabilities.causes if name not in members))
 

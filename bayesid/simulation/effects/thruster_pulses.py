@@ -27,7 +27,8 @@ class PulseTrain(NamedTuple):
     Attributes
     ----------
     period, width : float
-        From the beginning of a pulse to that of the next, and to its end [s].
+        From the beginning of a pulse to that of the next, and to its end [s]. With a width of a whole period the thrust
+        is steady: the average of a train that is too fast for the readings.
     alternating : bool
         Whether every other pulse has the opposite sign, as in a limit cycle.
     first : tuple of float
@@ -74,7 +75,7 @@ class ThrusterPulses(Effect):
             period, width, sign, *first = map(float, place.split(",")) if place else (10.0, 3.0, 0.0, 5.0)
         except ValueError:
             period, width, sign, first = -1.0, 0.0, 0.0, []
-        if not 0.0 < width < period or not first or sign not in (0.0, 1.0):
+        if not 0.0 < width <= period or not first or sign not in (0.0, 1.0):
             raise InputError(
                 f"{self.name}: {place!r} is not a train of pulses",
                 remedy=f"Give period, width, 0 or 1, and the first pulses: {self.name}:20,0.5,0,7 or with inf for none",
