@@ -356,6 +356,15 @@ def check_amplitude_quantities(effect: Effect, hook: str) -> None:
     assert effect.loads(jnp.asarray(effect.absent)).shape == (len(quantities),)
 
 
+def check_amplitude_shapes(effect: Effect, hook: str) -> None:
+    """Every form has a positive spread for each amplitude, the largest of which is its scale; forms differ."""
+    shapes = np.array(effect.amplitude_shapes)
+    assert shapes.shape[1] == len(effect.amplitude_quantities)
+    assert (shapes > 0.0).all()
+    np.testing.assert_array_equal(shapes.max(axis=1), 1.0)
+    assert len(np.unique(shapes, axis=0)) == len(shapes)
+
+
 def check_absent(effect: Effect, hook: str) -> None:
     assert effect.absent.shape == (len(effect.parameters),)
 
@@ -516,6 +525,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "longest_step": check_step,
     "quantities": check_quantities,
     "amplitude_quantities": check_amplitude_quantities,
+    "amplitude_shapes": check_amplitude_shapes,
     "physical_bounds": check_physical_bounds,
     "attach": check_attach,
     "starts": check_starts,
