@@ -460,6 +460,7 @@ class PerturbedModel:
         """Return the responses about a point, kept until another is asked for."""
         with ONE_AT_A_TIME:  # threads that need the same derivatives wait for the first of them
             if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
+                self._linear = None  # it takes as much memory as the next one
                 self._linear = LinearResponses.about(self.posterior, z, data)
             return self._linear
 
