@@ -90,7 +90,7 @@ def _draw_verdict(axes: Axes, diagnosis: Mapping[str, Any]) -> None:
     axes.grid(visible=False)
     chi2 = diagnosis["gain"]["chi2_per_sample"]
     gain = f"chi-square per sample {format_number(chi2['before'])} → {format_number(chi2['after'])}"
-    axes.set(title=f"3. Verdict: {diagnosis['status']}", xlabel=f"probability of being at work\n{gain}")
+    axes.set(title=f"3. Verdict: {diagnosis['status']}", xlabel=f"probability of being present\n{gain}")
 
 
 def run(folder: Path, output: Path) -> None:

@@ -161,9 +161,9 @@ def residuals_of(hypothesis: Hypothesis) -> ResidualView:
 def test_sentences_name_the_cause_its_probability_its_size_and_what_it_gains(biased):
     said = list(sentences.diagnosis_sentences(biased))
     assert said[0].startswith("Explained by accel-bias")
-    assert "The probability that it is at work is more than 0.999." in said[0]
+    assert "Its probability is more than 0.999." in said[0]
     assert "The accelerometer reads a constant value in free fall." in said[1]
-    assert "The probability that it is at work is more than 0.999." in said[1]
+    assert "Its probability is more than 0.999." in said[1]
     assert "m/s²" in said[1]
     assert "chi-square per sample goes from" in said[-1]
     assert "base_link." in said[-1]
@@ -198,12 +198,12 @@ def test_the_alternatives_are_said_with_their_probabilities_and_other_names(bias
     p = [result.probability_of(names) for names in (("accel-bias",), *ALTERNATIVES)]
     assert len({format_probability(value) for value in p}) == 4  # so that none can stand for another
     assert sum(p) == pytest.approx(1.0)
-    assert f"The probability that it is at work is {format_probability(p[0])}." in cause
+    assert f"Its probability is {format_probability(p[0])}." in cause
     assert others == [
-        f"Alternative: rate-bias + wheel-momentum (p = {format_probability(p[1])}). "
+        f"Alternative: rate-bias + wheel-momentum (probability {format_probability(p[1])}). "
         "Equivalent to wheel-momentum: a and b.",
-        f"Alternative: nothing (p = {format_probability(p[2])}).",
-        f"Alternative: something unknown (p = {format_probability(p[3])}).",
+        f"Alternative: nothing (probability {format_probability(p[2])}).",
+        f"Alternative: something unknown (probability {format_probability(p[3])}).",
     ]
     assert gain.startswith("Effect on the fit")
 
@@ -227,7 +227,7 @@ def test_an_alternative_holds_what_accompanies_it_and_a_cause_its_equivalents(bi
 def test_what_is_unknown_is_said_with_the_most_probable_generic_candidate(biased):
     result = weighed(judged(biased, Status.UNKNOWN), ((), "error of accel", 9.0), ((), "disturbing torque", 5.0))
     said = sentences.verdict_sentence(result)
-    assert f"(p = {format_probability(result.probabilities.unknown)})" in said
+    assert f"(probability {format_probability(result.probabilities.unknown)})" in said
     assert said.endswith("the most probable is: error of accel.")
 
 
@@ -235,7 +235,7 @@ def test_what_is_unresolved_is_said_with_the_most_probable_sets(biased):
     result = weighed(judged(biased, Status.UNRESOLVED), (("rate-bias",), None, 5.5), (("accel-drift",), None, 5.0))
     first, second, third = result.probabilities.sets
     words = [
-        f"{name} (p = {item.probability:.2f})"
+        f"{name} (probability {item.probability:.2f})"
         for name, item in zip(("rate-bias", "accel-drift", "nothing"), (first, second, third), strict=True)
     ]
     assert sentences.verdict_sentence(result).endswith(f"are: {'; '.join(words)}.")

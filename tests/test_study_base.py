@@ -220,6 +220,27 @@ def test_a_page_is_filled_by_what_runs_on_to_the_next_and_not_by_what_moves_ther
     assert _least_filled([(1, 0.1)], [True]) == 1.0
 
 
+def test_a_page_is_filled_by_the_figures_at_its_foot():
+    ends, whole = [(1, 0.4), (2, 0.9)], [False, False]
+    assert _least_filled(ends, whole, [(1, 0.7)]) == pytest.approx(0.7)
+    assert _least_filled(ends, whole, [(1, 0.7), (1, 0.5)]) == pytest.approx(0.9)  # the higher of two counts
+    assert _least_filled(ends, whole, [(3, 0.8)]) == pytest.approx(0.2)  # alone on the last page
+
+
+def test_a_floating_figure_is_made_higher_where_its_page_is_not_filled(tmp_path: Path):
+    document = Document("Floating")
+    figure = wide_figure(5.0)
+    figure.subplots().plot([0.0, 1.0])
+    document.paragraph("Text on the first page. " * 10)
+    document.figure(figure, "At the foot.", floating=True)
+    document.page()
+    document.paragraph("Text on the second page. " * 160)
+    for filled in (False, True):
+        document.write(tmp_path / f"{filled}.pdf", filled=filled)
+        assert len(PdfText.read(tmp_path / f"{filled}.pdf").pages) == 2
+    assert (tmp_path / "True.pdf").read_bytes() != (tmp_path / "False.pdf").read_bytes()
+
+
 def test_options_and_units_are_not_torn_at_line_ends(tmp_path: Path):
     document = Document("Lines")
     document.paragraph("python -m studies.weighing --full --seed 4 with 1 × 10⁻⁵ m/s². " * 40)

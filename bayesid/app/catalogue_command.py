@@ -18,7 +18,7 @@ def run(
         typer.Option(metavar="STUDY.toml", help="Study whose robot, orbit and plugins are used; by default ETS-VII."),
     ] = None,
 ) -> Iterator[str]:
-    """Print every effect with its parameters, units, priors, the reason for its largest size, and its requirements."""
+    """List the effects of the catalogue: parameters, units, priors, largest plausible sizes, requirements."""
     from bayesid.app.schema import Study
 
     loaded = None if study is None else Study.load(study)

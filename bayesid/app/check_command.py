@@ -12,7 +12,7 @@ __all__ = ["run"]
 
 
 def run(file: StudyFile, output: Output, progress: Progress) -> Iterator[str]:
-    """Validate a study and its recordings, and report their contents: check.json and report.pdf."""
+    """Check a study and its recordings without a fit: check.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -32,11 +32,12 @@ def run(
     progress: Progress,
     seed: Seed = 0,
     effective_samples: Samples = 4000.0,
-    example: Annotated[str, typer.Option(metavar="NAME", help=f"Example study: {', '.join(EXAMPLES)}.")] = "arm",
+    example: Annotated[str, typer.Option(metavar="NAME", help=f"Example to diagnose: {', '.join(EXAMPLES)}.")] = "arm",
 ) -> Iterator[str]:
-    """Diagnose example recordings with a hidden cause, reveal the cause and write the report, without input files."""
+    """Diagnose built-in recordings with a hidden cause, then reveal the cause; needs no input files."""
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
+    from bayesid.report.numbers import format_number
 
     if example == "axes":
         yield from _other_axes(output, seed, progress)
@@ -48,7 +49,7 @@ def run(
     yield from diagnose_study(study, output, seed, effective_samples, progress, result.append)
     named = result[0].verdict.causes
     for cause, values in answer.items():
-        parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
+        parts = ", ".join(f"{key} {format_number(value, 4)}" for key, value in values.items())
         yield f"The hidden cause was {cause}: {parts}. It was {'identified' if cause in named else 'not identified'}."
 
 

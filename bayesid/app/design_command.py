@@ -24,7 +24,7 @@ def run(
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts per criterion.")] = 12,
     iterations: Annotated[int, typer.Option(min=1, help="Maximum number of optimiser iterations per start.")] = 400,
     thorough: Annotated[
-        bool, typer.Option(help="Continue the search between the best motions; this takes about five times as long.")
+        bool, typer.Option(help="Search more widely, also between the best motions; takes about five times as long.")
     ] = False,
     separate: Annotated[
         tuple[str, str] | None,
@@ -32,7 +32,7 @@ def run(
     ] = None,
     scheduler: Scheduler = None,
 ) -> Iterator[str]:
-    """Design manoeuvres by several criteria within limits: design.json, a CSV file per manoeuvre, and report.pdf."""
+    """Design the best manoeuvre by each criterion within limits: design.json, CSV files and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

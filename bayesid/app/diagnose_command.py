@@ -25,9 +25,9 @@ def run(
     seed: Seed = 0,
     effective_samples: Samples = 4000.0,
     sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee after the verdict.")] = True,
-    fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre where the verdict is undecided.")] = True,
+    fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre if the verdict is undecided.")] = True,
 ) -> Iterator[str]:
-    """Compare simulation and recordings, identify the cause of deviations, extend the model and measure the gain."""
+    """Name the causes of a misfit of the simulation, add them to the model and measure the improvement."""
     from bayesid.app.schema import Study
 
     study, sampled = Study.load(file), effective_samples if sample else None

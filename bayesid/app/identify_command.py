@@ -17,7 +17,7 @@ __all__ = ["run"]
 def run(
     file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0
 ) -> Iterator[str]:
-    """Identify the inertial parameters of the unknown bodies as a posterior distribution."""
+    """Compute the posterior distribution of the inertial parameters of the unknown bodies."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)
@@ -63,9 +63,16 @@ def run(
 
 def _summary(result: Identification) -> Iterator[str]:
     from bayesid.identifiability.directions import unidentifiable_sentences
+    from bayesid.report.identification_report import LIMIT
+    from bayesid.report.numbers import format_quantity
 
-    yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
+    samples, (expected, spread) = result.posterior.samples, result.expected_chi2
+    misfit = "" if result.chi2_deviation <= LIMIT else " The model does not explain the data: run bayesid diagnose."
+    yield (
+        f"Chi-square per sample is {result.optimum.chi2 / samples:.3f}; noise alone gives {expected / samples:.3f} ± "
+        f"{spread / samples:.3f}.{misfit}"
+    )
     for name, body in result.bodies.items():
-        yield f"{name}: mass {body.mean[0]:.6g} +- {body.sd[0]:.2g} kg"
+        yield f"{name}: mass {format_quantity(body.mean[0], body.sd[0])} kg"
     yield from unidentifiable_sentences(result)
     yield from result.disagreements

@@ -72,7 +72,7 @@ def run(
         ),
     ] = None,
 ) -> Iterator[str]:
-    """Convert a ROS 1 or ROS 2 bag into a recording: NAME.csv, and its origin in NAME.import.json."""
+    """Convert a ROS 1 or ROS 2 bag into a recording, NAME.csv, and document its origin in NAME.import.json."""
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_conventions import imported_as
     from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag

@@ -45,7 +45,7 @@ def run(
     at_most: Annotated[int, typer.Option(help="Maximum number of manoeuvres.")] = 5,
     diagnose: Annotated[bool, typer.Option(help="Diagnose after every step and stop if the model is wrong.")] = True,
 ) -> Iterator[str]:
-    """Plan a manoeuvre, have it executed, identify, diagnose and repeat: loop.json and report.pdf."""
+    """Plan a manoeuvre, evaluate its recording, plan the next one and so on: loop.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

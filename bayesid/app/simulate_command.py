@@ -18,7 +18,7 @@ def run(
     seed: Seed = 0,
     noise: Annotated[bool, typer.Option(help="Add the declared noise of the sensors.")] = True,
 ) -> Iterator[str]:
-    """Simulate the sensor readings of a study at the stated values: recordings, simulation.json and report.pdf."""
+    """Simulate the sensor readings of a study with its given values: recordings, simulation.json, report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -211,7 +211,7 @@ class Paper26(Criterion):
     """Criterion (26) of the paper as printed, a reference for the other criteria.
 
     It is computed from the largest excursions y1, y2, y3 of the base along each axis, for position and attitude.
-    Because the printed differences have signs, most terms cancel: -y1^2 + y2^2 + 3 y3^2 is maximised. This rewards
+    Because the printed differences have signs, most terms cancel: −y1² + y2² + 3 y3² is maximised. This rewards
     the third axis and penalises the first, instead of balancing the three. Metres and radians are added.
     """
 
@@ -243,7 +243,7 @@ class Paper26(Criterion):
 class Paper26Intended(Paper26):
     """Apparent intention of (26): unequal excursions along the three axes increase the cost, whatever the sign.
 
-    With the excursions sorted by size, 3 smallest^2 + middle^2 - largest^2 is maximised.
+    With the excursions sorted by size, 3 smallest² + middle² − largest² is maximised.
     """
 
     name = "paper-26-intended"

@@ -187,7 +187,7 @@ def separation_sentence(design: Design) -> str:
         raise ValueError(f"{design.name} was not designed to separate effects")
     rates = [
         f"{format_percent(rate.rate, 3)} of its readings (standard error {format_percent(rate.standard_error, 1)}) if "
-        f"{label} is at work"
+        f"{label} is the cause"
         for label, rate in design.decisions.items()
     ]
     return (

@@ -54,10 +54,11 @@ QUANTITY = re.compile(
 _MARK = """
 #context {
   let at = here().position()
-  [#metadata((at.page, (at.y - 20mm) / 255mm)) <end>]
+  [#metadata((at.page, (at.y - 20mm) / 255mm)) <%s>]
 }
 """
-"""Mark at the end of a part: its page, and how far down the text's height it stands."""
+_END, _FLOAT = _MARK % "end", _MARK % "float"
+"""Marks at the end of a part and at the top of a floating figure: their page, and how far down the text's height."""
 
 
 class LinkedText(str):
@@ -180,10 +181,9 @@ class Document:
         if not re.fullmatch(r"\d+(\.\d+)?%", width):
             raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
         name = self._image(fig)
-        place = "bottom" if floating else "none"
-        self._parts.append(
-            f"#figure(image({name}, width: {width}), kind: image, placement: {place}, caption: {literal(caption)})\n"
-        )
+        place, top = ("bottom", f"place[{_FLOAT}]") if floating else ("none", "none")
+        body = f"{top} + image({name}, width: {width})"
+        self._parts.append(f"#figure({body}, kind: image, placement: {place}, caption: {literal(caption)})\n")
 
     def _image(self, fig: Figure) -> str:
         """Keep a figure for the document and return the literal of its file's name."""
@@ -200,7 +200,7 @@ class Document:
             Whether all figures and tables may be made lower or higher by one of `HEIGHTS`, if that fills the pages.
         """
         look, *content = self._parts
-        marked = [part + _MARK if _sets(part) else part for part in content]
+        marked = [part + _END if _sets(part) else part for part in content]
         source = "".join([look, *self._links, *marked])
         factor = self._filling_height(source) if filled else 1.0
         with tempfile.TemporaryDirectory() as folder:
@@ -218,8 +218,11 @@ class Document:
             with tempfile.TemporaryDirectory() as folder:
                 main = _write_all(Path(folder), source, [figure.blank(factor) for figure in self._figures])
                 inputs = {"height": str(factor)}
-                ends = typst.query(main, "<end>", field="value", root=folder, sys_inputs=inputs, font_paths=FONTS)
-            return _least_filled(json.loads(ends), flows)
+                ends, tops = (
+                    json.loads(typst.query(main, mark, field="value", root=folder, sys_inputs=inputs, font_paths=FONTS))
+                    for mark in ("<end>", "<float>")
+                )
+            return _least_filled(ends, flows, tops)
 
         fills: dict[float, float] = {}
         for first in range(0, len(HEIGHTS), TOGETHER):
@@ -241,7 +244,9 @@ def _flows(part: str) -> bool:
     return part.startswith(("#par", "#list", "#{"))
 
 
-def _least_filled(ends: Sequence[tuple[int, float]], flows: Sequence[bool]) -> float:
+def _least_filled(
+    ends: Sequence[tuple[int, float]], flows: Sequence[bool], tops: Sequence[tuple[int, float]] = ()
+) -> float:
     """Return how far the emptiest page is filled, the only page of a document counting as full.
 
     Parameters
@@ -250,11 +255,18 @@ def _least_filled(ends: Sequence[tuple[int, float]], flows: Sequence[bool]) -> f
         Page on which each part ends, and how far down.
     flows : sequence of bool
         Whether each part may begin on an earlier page, which it then fills.
+    tops : sequence of (int, float)
+        Page of each floating figure, which fills it from there to its foot.
     """
     depths = dict(ends)  # by page, that of the last part which ends there
     for (before, _), (after, _), flowing in zip(ends, ends[1:], flows[1:], strict=False):
         if after > before and flowing:
             depths[before] = 1.0
+    last = max(depths)
+    highest = {page: min(top for there, top in tops if there == page) for page, _ in tops}
+    for page, top in highest.items():
+        if page in depths or page > last:  # on all other pages a part runs on, which fills them
+            depths[page] = min(depths.get(page, 0.0) + 1.0 - top, 1.0)
     return min(depths.values()) if len(depths) > 1 else 1.0
 
 

@@ -42,6 +42,8 @@ def write_notebook(source: Path, folder: Path, name: str) -> Path:
     body, resources = MarkdownExporter().from_notebook_node(notebook)
     for file, content in resources["outputs"].items():
         (folder / file).write_bytes(content)
+        cell = notebook.cells[int(file.split("_")[1])]  # a file is output_CELL_NUMBER.png
+        body = body.replace(f"![png]({file})", f"![Picture drawn by {cell.source.splitlines()[-1]}]({file})")
     page = folder / f"{name}.md"
     page.write_text(f"# {TITLE}\n\n[Download the notebook]({name}.ipynb)\n\n{body}", encoding="utf-8")
     return page

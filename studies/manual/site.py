@@ -26,6 +26,7 @@ from studies.manual.sources import sources
 __all__ = ["write_site"]
 
 HEADINGS = ["h3", "h4", "h5"]  # below a chapter's
+STYLE = Path(__file__).with_name("site.css")
 TITLE = re.compile(r"^[\d.]+\s+")  # number of a heading, which the PDF has
 
 
@@ -52,6 +53,7 @@ class _Page:
                     link["href"] = places[target]
             for drawing in element.select("figure svg"):
                 drawing["style"] += "; max-width: 100%; height: auto"  # on narrow screens
+                drawing["role"], drawing["aria-label"] = "img", _caption(drawing.find_parent("figure"))
             if element.name in HEADINGS:
                 anchor = element.get("id") or _slug(element.get_text())
                 parts.append(f"{'#' * (int(element.name[1]) - 1)} {_heading(element)} {{ #{anchor} }}")
@@ -102,6 +104,7 @@ def write_site(folder: Path) -> None:
         for page, file in zip(pages, files, strict=True):
             file.write_text(page.markdown(places), encoding="utf-8")
         shutil.copytree(STORED, docs / "pictures")
+        shutil.copy(STYLE, docs)
         tutorial = write_notebook(TUTORIAL, docs, _slug(TUTORIAL_TITLE))
         contents = [{page.title: file.name} for page, file in zip(pages, files, strict=True)]
         contents.insert(1, {TUTORIAL_TITLE: tutorial.name})
@@ -112,6 +115,7 @@ def write_site(folder: Path) -> None:
             "use_directory_urls": False,
             "theme": {"name": "material", "font": False, "features": ["toc.follow", "search.suggest"]},
             "markdown_extensions": ["attr_list", "pymdownx.highlight", "pymdownx.superfences"],
+            "extra_css": [STYLE.name],
             "plugins": ["search"],
             "nav": contents,
             "strict": True,
@@ -148,6 +152,11 @@ def _heading(element: Any) -> str:
     """Return the text of a heading, code between back quotes."""
     text = "".join(f"`{part.get_text()}`" if part.name == "code" else part.get_text() for part in element.children)
     return TITLE.sub("", text)
+
+
+def _caption(figure: Any) -> str:
+    """Return the caption of a figure, for readers who do not see it."""
+    return " ".join(figure.figcaption.get_text().split())
 
 
 def _slug(text: str) -> str:

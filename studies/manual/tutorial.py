@@ -1,9 +1,9 @@
 # %% [markdown]
 """
-The demonstration of the command line, step by step in Python. The package includes its files: three recordings of a
-servicer with a robot arm, simulated by MuJoCo with one effect that the study does not mention. The study names the
-robot, the sensors with their noise, the recordings and what is unknown. This page was executed when the site was
-built.
+This page repeats the demonstration of the command line step by step in Python. Its files are part of the package:
+three recordings of a servicer with a robot arm, simulated by MuJoCo with one effect that the study does not mention.
+The study names the robot, the sensors and their noise, the recordings, and the unknowns. All output below was produced
+when this site was built.
 """
 
 # %%
@@ -19,7 +19,7 @@ print(study.read_text())
 """
 ## Check the recordings
 
-Wrong axes, signs and units are the most frequent mistakes. `check` fits nothing.
+Most misfits come from wrong axes, signs or units. `check` looks for them without fitting anything.
 """
 
 # %%
@@ -33,8 +33,8 @@ bayesid.plot_manoeuvre(checked.posterior, 0)
 """
 ## Diagnose
 
-Every command is a function with a seed. `diagnose` fits the study as it is, compares the causes of the catalogue, and
-samples the posterior of the model with the named cause.
+Every command is also a function, with a seed if it uses random numbers. `diagnose` fits the study as it is, compares
+the causes of the catalogue, and samples the posterior of the model that includes the named cause.
 """
 
 # %%
@@ -43,8 +43,8 @@ print(diagnosis)
 
 # %% [markdown]
 """
-The picture contains the robot with the cause, and the residual of the sensor axis that the cause changes most, without
-it and with it.
+The picture has the robot with the cause on the left, and on the right the residual of the sensor axis that the cause
+affects most, before and after the cause is included.
 """
 
 # %%
@@ -52,7 +52,7 @@ bayesid.plot_verdict(diagnosis)
 
 # %% [markdown]
 """
-What was hidden in the recordings:
+The effect that was hidden in the recordings:
 """
 
 # %%
@@ -62,7 +62,7 @@ print((folder / "hidden.json").read_text())
 """
 ## Use the result
 
-The identification of the extended model has named fields. Quantities have a mean, a standard deviation, a unit and
+The identification of the extended model has named fields. Each quantity has a mean, a standard deviation, a unit and
 intervals.
 """
 
@@ -72,14 +72,14 @@ assert result is not None  # None if not sampled
 base = result.bodies["base_link"]
 print("mass:", base.mass)
 print("inertia xx, 95 %:", base.inertia.xx.interval(0.95))
-print("chi-square per sample with the cause:", diagnosis.to_dict()["gain"]["chi2_per_sample"]["after"])
+print("chi-square per sample with the cause:", diagnosis.gain.after.chi2_per_sample)
 
 # %%
 bayesid.plot_posterior(result, "base_link")
 
 # %% [markdown]
 """
-The robot with the posterior mean of the base, for another program:
+The robot with the posterior mean of the base can be written as URDF for use in other software:
 """
 
 # %%

@@ -43,7 +43,7 @@ def diagnose(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Compare simulation and recordings, identify the cause of deviations, extend the model and measure the gain.
+    """Name the causes of a misfit of the simulation, add them to the model and measure the improvement.
 
     Parameters
     ----------

@@ -152,7 +152,7 @@ def loop(
     diagnose: bool = True,
     progress: Progress = silent,
 ) -> LoopResult:
-    """Plan a manoeuvre, have it executed, identify, diagnose, and repeat until the goals are reached.
+    """Plan a manoeuvre, evaluate its recording, and repeat until the goals are reached.
 
     Parameters
     ----------

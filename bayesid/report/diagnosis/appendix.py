@@ -116,7 +116,7 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
         ],
         candidate_rows(result.candidates, result.alarm.level),
         f"All {len(result.candidates)} candidates, each added alone to the present model, in the linear approximation. "
-        "The probability is that of being at work, alone or with other causes. Candidates that stand out have a size; "
+        "The probability is that of being present, alone or with other causes. Candidates that stand out have a size; "
         "the magnitudes of the others lie below the given limits with 95 % probability. Empty cells were not "
         "evaluated.",
     )
@@ -128,7 +128,7 @@ def _add_torques(document: Document, result: Diagnosis) -> None:
             ["candidate", "probability:", "size ± sd"],
             torque_rows(result.torques),
             "Candidates that could act on the joint torques alone, evaluated after the verdict on the motion: the "
-            "probability of being at work, and the size in that case. Something unknown is a torque with any smooth "
+            "probability of being present, and the size in that case. Something unknown is a torque with any smooth "
             "time history at one joint.",
         )
 

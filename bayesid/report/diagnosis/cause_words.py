@@ -16,7 +16,6 @@ from bayesid.report.numbers import (
     format_quantity,
     format_unit,
     format_vector,
-    relation,
 )
 
 __all__ = [
@@ -46,8 +45,8 @@ def set_text(names: Sequence[str]) -> str:
 
 
 def probability_text(value: float) -> str:
-    """Return a probability as it stands in parentheses: ``p = 0.93``."""
-    return f"p {relation(format_probability(value))}"
+    """Return a probability as it stands in parentheses: ``probability 0.93``; the letter p is that of p-values."""
+    return f"probability {format_probability(value)}"
 
 
 def verdict_text(verdict: ProbableVerdict) -> str:

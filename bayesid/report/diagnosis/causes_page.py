@@ -54,6 +54,7 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each added alone "
         "to the present model. One cause can make several candidates stand out, because they explain parts of the same "
         "residual.",
+        floating=True,
     )
 
 

@@ -67,7 +67,7 @@ SEPARATE_UNKNOWN = (
     "of the motion, effects that depend on the motion at the same instant. Then repeat it with the base in a different "
     "attitude, and record with the arm at rest."
 )
-"""Advice where no cause of the catalogue is at work."""
+"""Advice where no cause of the catalogue is present."""
 
 ANYTHING = "Repeat the manoeuvre with different amplitudes and speeds, and with the base in a different attitude."
 """Advice on a cause of which nothing is known."""
@@ -151,9 +151,9 @@ def _them(result: Diagnosis) -> str:
 
 
 def _together(result: Diagnosis) -> str:
-    """Return the probability that the named causes are at work."""
-    they = "it is" if len(result.verdict.causes) == 1 else "all are"
-    return f"The probability that {they} at work is {_is(result.probability_of(result.verdict.causes))}."
+    """Return the probability that the named causes are present."""
+    which = "Its probability" if len(result.verdict.causes) == 1 else "The probability that all of them are present"
+    return f"{which} is {_is(result.probability_of(result.verdict.causes))}."
 
 
 def _is(value: float) -> str:
@@ -178,7 +178,7 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
     for label in result.verdict.causes:
         parts = [
             f"{label}. {cause_summary(result.after, label)}".rstrip(),
-            f"The probability that it is at work is {_is(result.cause_probability(label))}.",
+            f"Its probability is {_is(result.cause_probability(label))}.",
         ]
         if amplitude := amplitudes_of(result.after, label):
             rest = "; the table of the named causes lists all of them" if len(amplitude) > AT_MOST else ""
@@ -227,7 +227,7 @@ def gain_sentence(result: Diagnosis) -> str:
     if shifts := dict(zip(before.bodies.names, result.gain.shift.tolist(), strict=True)):
         name = max(shifts, key=lambda key: abs(shifts[key]))
         parts.append(
-            f"the inertial parameter that moves most is {name}, by {format_signed(shifts[name])} standard deviations "
+            f"the inertial parameter that changes most is {name}, by {format_signed(shifts[name])} standard deviations "
             f"of the fit without the named {'cause' if len(result.verdict.causes) == 1 else 'causes'}"
         )
     text = f"{', '.join(parts[:-1])}, and {parts[-1]}" if len(parts) > 1 else parts[0]

@@ -101,7 +101,7 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     )
     yield (
         "The probability of a set of causes is proportional to its evidence times its prior. The prior has two "
-        f"numbers: one more cause is at work with a probability of {format_number(prior.one_more)}, regardless of how "
+        f"numbers: one more cause is present with a probability of {format_number(prior.one_more)}, regardless of how "
         f"many there are, and something outside the catalogue with {format_number(prior.generic)}. All sets of the "
         "same size are equally probable a priori."
     )

@@ -159,7 +159,7 @@ class _LinkMoments(Placed):
 class Payload(_OnLink):
     """Rigid body that is fixed to a link and missing from the model.
 
-    At one standard deviation of the prior, the mass of the link is wrong by a factor of e^2.
+    At one standard deviation of the prior, the mass of the link is wrong by a factor of e² = 7.4.
     """
 
     name = "payload"
