@@ -225,6 +225,7 @@ def test_a_page_is_filled_by_the_figures_at_its_foot():
     assert _least_filled(ends, whole, [(1, 0.7)]) == pytest.approx(0.7)
     assert _least_filled(ends, whole, [(1, 0.7), (1, 0.5)]) == pytest.approx(0.9)  # the higher of two counts
     assert _least_filled(ends, whole, [(3, 0.8)]) == pytest.approx(0.2)  # alone on the last page
+    assert _least_filled(ends, whole, [(1, 0.1)]) == 0.4  # at the head, above what ends there
 
 
 def test_a_floating_figure_is_made_higher_where_its_page_is_not_filled(tmp_path: Path):

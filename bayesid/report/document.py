@@ -176,12 +176,12 @@ class Document:
         width : str
             Width in percent of the text's width, such as ``80%``.
         floating : bool
-            Whether it goes to the foot of this page or of the next one, so that what follows fills the page.
+            Whether it goes to the head or foot of this page or of the next one, so that what follows fills the page.
         """
         if not re.fullmatch(r"\d+(\.\d+)?%", width):
             raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
         name = self._image(fig)
-        place, top = ("bottom", f"place[{_FLOAT}]") if floating else ("none", "none")
+        place, top = ("auto", f"place[{_FLOAT}]") if floating else ("none", "none")
         body = f"{top} + image({name}, width: {width})"
         self._parts.append(f"#figure({body}, kind: image, placement: {place}, caption: {literal(caption)})\n")
 
@@ -256,14 +256,15 @@ def _least_filled(
     flows : sequence of bool
         Whether each part may begin on an earlier page, which it then fills.
     tops : sequence of (int, float)
-        Page of each floating figure, which fills it from there to its foot.
+        Page and top of each floating figure, which fills the page to its foot, if it stands below the last part.
     """
     depths = dict(ends)  # by page, that of the last part which ends there
     for (before, _), (after, _), flowing in zip(ends, ends[1:], flows[1:], strict=False):
         if after > before and flowing:
             depths[before] = 1.0
     last = max(depths)
-    highest = {page: min(top for there, top in tops if there == page) for page, _ in tops}
+    feet = [(page, top) for page, top in tops if top >= depths.get(page, 0.0)]  # others push parts down, which count
+    highest = {page: min(top for there, top in feet if there == page) for page, _ in feet}
     for page, top in highest.items():
         if page in depths or page > last:  # on all other pages a part runs on, which fills them
             depths[page] = min(depths.get(page, 0.0) + 1.0 - top, 1.0)

@@ -26,6 +26,7 @@ from studies.manual.sources import sources
 __all__ = ["write_site"]
 
 HEADINGS = ["h3", "h4", "h5"]  # below a chapter's
+BETWEEN_CODE = "</code><wbr><code>"  # where code may break: the theme frames every piece, so they become one
 STYLE = Path(__file__).with_name("site.css")
 TITLE = re.compile(r"^[\d.]+\s+")  # number of a heading, which the PDF has
 
@@ -88,7 +89,7 @@ def write_site(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as work:
         typ, docs = Path(work) / "typst", Path(work) / "docs"
         docs.mkdir()
-        text = typst.compile(str(sources(typ)), root=str(typ), format="html").decode()
+        text = typst.compile(str(sources(typ)), root=str(typ), format="html").decode().replace(BETWEEN_CODE, "<wbr>")
         pages = list(_pages(BeautifulSoup(text, "html.parser")))
         files = [docs / f"{'index' if number == 0 else page.name}.md" for number, page in enumerate(pages)]
         places = {
