@@ -159,8 +159,8 @@ def practical_sentences(result: Practical) -> list[str]:
     total = len(result.parameters)
     fully, weakly, not_at_all = (count[verdict] for verdict in ContractionVerdict)
     sentences = [
-        f"Of {total} parameters of the bodies to identify, {fully} are learnt, {weakly} weakly learnt and {not_at_all} "
-        "not learnt."
+        f"Of the {total} parameters of the bodies to identify, {fully} are learnt from the data, {weakly} weakly and "
+        f"{not_at_all} not at all."
     ]
     if names := [item.name for item in result.parameters if item.verdict is ContractionVerdict.NOT]:
         sentences.append(f"Not learnt (the posterior equals the prior): {abridged(names)}.")
@@ -185,8 +185,9 @@ def advice_sentences(result: Practical) -> list[str]:
     if not usable or usable[0].directions[0] > 0.95 * now:
         return ["None of the candidates narrows the worst direction by more than 5 %."]
     best = [item for item in usable if item.directions[0] <= 0.95 * now][:WORST]
-    texts = "; ".join(f"{format_percent(item.directions[0])} with {item.text}" for item in best)
-    return [f"In the worst direction, {format_percent(now)} of the prior's width remains. It would be {texts}."]
+    texts = "; ".join(f"to {format_percent(item.directions[0])} ({item.text})" for item in best)
+    remains = f"In the worst direction, {format_percent(now)} of the prior's width remains."
+    return [f"{remains} It could be reduced {texts}."]
 
 
 def confidence_sentences(result: Practical) -> list[str]:
