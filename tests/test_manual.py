@@ -242,7 +242,7 @@ def test_what_the_index_names_is_on_its_page(index, text):
 
 
 def test_the_index_is_at_the_end_of_the_pdf(index, text):
-    first = next(number for number, page in enumerate(text.pages) if re.match(r"\d+ Index\n", page))
+    first = next(number for number, page in enumerate(text.pages) if re.search(r"(?m)^\d+ Index$", page))
     assert len(text.pages) - 4 <= first
     last = PdfText(text.pages[first:])
     assert [name for name in index if name not in last] == []

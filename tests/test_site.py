@@ -112,6 +112,20 @@ def test_pictures_from_real_runs_are_on_their_pages(site):
         assert all((site / source).is_file() for source in sources)
 
 
+def test_every_picture_has_a_text_of_its_own_for_readers_who_do_not_see_it(site):
+    pages = "\n".join(file.read_text(encoding="utf-8") for file in sorted(site.glob("*.html")))
+    pictures = re.findall(r"<img [^>]*>", pages)
+    texts = [text for picture in pictures for text in re.findall(r'alt="([^"]{25,})"', picture)]
+    assert len(texts) == len(pictures) == len(set(texts))
+    drawings = [part.partition(">")[0] for figure in pages.split("<figure")[1:] for part in figure.split("<svg")[1:2]]
+    assert len(drawings) >= 2
+    assert all('role="img"' in drawing and "aria-label=" in drawing for drawing in drawings)
+
+
+def test_the_theme_frames_no_pieces_of_code(site):
+    assert not any("</code><wbr" in file.read_text(encoding="utf-8") for file in site.glob("*.html"))
+
+
 def test_the_tutorial_in_python_was_executed(site):
     page = (site / "tutorial-in-python.html").read_text(encoding="utf-8")
     assert "Verdict: explained, wheel-momentum" in page
