@@ -14,8 +14,10 @@ from bayesid._math.double_precision import in_double_precision
 from bayesid.design import DOptimal, Limits, Problem, Search, Separation, design
 from bayesid.design.decision_rate import DecisionRate, RivalDraws, decided_margins, log_evidence, smooth_rates
 from bayesid.design.design_result import with_starts
+from bayesid.design.go_no_go import ATTEMPTS, _best_by_others, plan_to_go
 from bayesid.design.rival_prior import MOMENT_REACHES, UNRESOLVED, RivalPrior, relative_floors
 from bayesid.design.search_starts import adapted_to_family
+from bayesid.design.trajectory_search import Store
 from bayesid.diagnosis.candidates.linear_cause import REACHES, moment_spreads
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import UNRESOLVED_GAIN, AmplitudeGroup, CandidateCause, range_of
@@ -175,6 +177,17 @@ def test_the_manoeuvre_is_never_worse_than_the_d_optimal_one(problem: Problem):
     rates = [min(item.decisions.values()) for item in both]
     assert all(rate.draws == Separation.REPORTED for rate in rates)
     assert costs["separation"] < problem.cost(problem.criteria[1], problem.plan.family.centre)[0]
+
+
+@pytest.mark.slow
+def test_a_loop_never_plans_a_worse_manoeuvre_than_the_d_optimal_one(problem: Problem):
+    alone = problem.judged_by(problem.criteria[1:])
+    effort, store = Search(starts=1, iterations=8), Store.forgetful()
+    (first, *_) = plan_to_go(alone, alone.criteria[0], np.random.SeedSequence(3), effort, store)
+    seed = np.random.SeedSequence(3)
+    seed.spawn(ATTEMPTS)
+    (best,) = _best_by_others(alone, alone.criteria[0], seed, effort, store)
+    assert first.optimum.cost <= problem.cost(problem.criteria[1], best)[0] + 1e-9
 
 
 def test_the_d_optimal_manoeuvre_is_sought_where_only_separation_is_asked_for():

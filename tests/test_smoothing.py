@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesid.recording.jumps import smooth_joints
-from bayesid.recording.smoothing import JointSamples, smooth
+from bayesid.recording.smoothing import MOST_EVALUATIONS, ORDERS, JointSamples, _Problem, smooth
 from studies.common import mission
 from studies.truth.recordings import Truth
 
@@ -255,3 +255,17 @@ def test_steps_of_very_different_roughness_do_not_spoil_the_states():
     for joint, angle in zip(mission.recorded(truth, rng, bias=np.zeros(3)).motion.joints, position.T, strict=True):
         assert joint.chi2 < 1.5 * joint.samples
         assert np.abs(joint.evaluate(times)[0] - angle).max() < 5e-6
+
+
+@pytest.mark.parametrize("exact", [0.01 * TIME, 1e-4 * TIME**2], ids=["ramp", "parabola"])
+def test_readings_without_noise_take_few_evaluations(monkeypatch, exact):
+    """Their likelihood grows with every digit that noise and process lose, until rounding makes it rough."""
+    solved, refined = [], []
+    solve, gradient = _Problem.solve, _Problem._gradient
+    monkeypatch.setattr(_Problem, "solve", lambda *given: solved.append(1) or solve(*given))
+    monkeypatch.setattr(_Problem, "_gradient", lambda *given: refined.append(1) or gradient(*given))
+    fit = smooth([JointSamples(0, TIME, exact, None)])
+    np.testing.assert_allclose(fit.evaluate(TIME)[0], exact, rtol=0.0, atol=1e-10)
+    assert fit.sigmas[0] < 1e-9
+    assert len(solved) <= len(ORDERS) * (2 * MOST_EVALUATIONS + 3)
+    assert len(refined) < 16 * len(solved)

@@ -10,9 +10,10 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
+from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
-from bayesid.design.design_result import Risk, risks
+from bayesid.design.design_result import Risk, risks, with_starts
 from bayesid.design.motion_limits import Limits
 from bayesid.design.trajectory_search import Search, SearchResult, Store, optimise
 
@@ -97,8 +98,9 @@ def plan_to_go(
         All attempts; the last one may be flown if it is a go.
     """
     attempts: list[Attempt] = []
-    tight, first = problem, None
-    for number, stream in enumerate(seed.spawn(ATTEMPTS)):
+    streams = seed.spawn(ATTEMPTS)
+    tight, first = problem, _best_by_others(problem, criterion, seed, search, store)
+    for number, stream in enumerate(streams):
         starts, draws = stream.spawn(2)
         known = store.of(f"attempt-{number + 1}")
         try:
@@ -107,7 +109,7 @@ def plan_to_go(
                 criterion,
                 np.random.default_rng(starts),
                 search if number == 0 else replace(search, starts=0),
-                first=() if first is None else [first],
+                first=first,
                 known=known.known,
                 keep=known.keep,
                 progress=progress,
@@ -120,10 +122,24 @@ def plan_to_go(
         attempts.append(Attempt(tight.limits, optimum, risky, problem.reached(optimum.parameters)))
         if attempts[-1].go:
             break
-        tight, first = tight.with_limits(_tightened(tight.limits, risky)), optimum.parameters
+        tight, first = tight.with_limits(_tightened(tight.limits, risky)), [optimum.parameters]
     if not attempts[-1].go:
         attempts.append(_made_smaller(problem, criterion, attempts[-1], draws))
     return attempts
+
+
+def _best_by_others(
+    problem: Problem, criterion: Criterion, seed: np.random.SeedSequence, search: Search, store: Store
+) -> list[Floats]:
+    """Return the best manoeuvres by the criteria from which another starts (`Criterion.starts_from`)."""
+    whole = with_starts(problem)
+    others = [other for other in whole.criteria if other.name in criterion.starts_from]
+    found = []
+    for other, stream in zip(others, seed.spawn(len(others)), strict=True):
+        known = store.of(other.name)
+        rng = np.random.default_rng(stream)
+        found.append(optimise(whole, other, rng, search, known=known.known, keep=known.keep).parameters)
+    return found
 
 
 def _made_smaller(problem: Problem, criterion: Criterion, last: Attempt, draws: np.random.SeedSequence) -> Attempt:

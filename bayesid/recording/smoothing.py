@@ -48,6 +48,12 @@ SNAP = 0.02
 REFINED = 1e-6
 MOST_REFINEMENTS = 20
 
+MOST_EVALUATIONS = 100
+"""Largest number of evaluations of the likelihood per unknown in a fit with undeclared noise; most take 20 to 50."""
+
+FINEST = 2.0**-32
+"""Smallest noise of readings relative to the largest of them, where it is estimated: no encoder has more bits."""
+
 
 @dataclass(frozen=True)
 class JointSamples:
@@ -441,12 +447,13 @@ def _fit(
     problem = _Problem(nodes / scale, scaled, start, order, jumps, roughness)
     units = [scale**series.derivative for series in samples]
     guess = [math.log(problem.roughness() * 10.0)]
-    guess += [
-        math.log(max(problem.noise_guess(index), 1e-14)) for index, series in enumerate(samples) if series.sigma is None
-    ]
+    undeclared = [index for index, series in enumerate(samples) if series.sigma is None]
+    guess += [math.log(max(problem.noise_guess(index), 1e-14)) for index in undeclared]
+    # readings without noise would have the better likelihood, the less noise they are thought to have
+    least = [-46.0, *(math.log(max(FINEST * float(np.abs(scaled[index].value).max()), 1e-20)) for index in undeclared)]
 
     def unpack(logs: Floats) -> tuple[float, list[float]]:
-        free = iter(np.exp(np.clip(logs, -46.0, 23.0)))
+        free = iter(np.exp(np.clip(logs, least, 23.0)))
         intensity = float(next(free))
         return intensity, [
             float(next(free)) if series.sigma is None else series.sigma * unit
@@ -470,7 +477,8 @@ def _fit(
             loss,
             simplex[0],
             method="Nelder-Mead",
-            options={"xatol": 0.05, "fatol": 1e-2, "maxiter": 400, "initial_simplex": simplex},
+            # exact readings leave a likelihood that rounding makes rough: shrinking would go on for ever
+            options={"xatol": 0.05, "fatol": 1e-2, "maxfev": MOST_EVALUATIONS * len(guess), "initial_simplex": simplex},
         ).x
     intensity, sigmas = unpack(optimum)
     log_likelihood, states, factor, chi2 = problem.solve(intensity, sigmas)
@@ -619,20 +627,22 @@ class _Problem:
         """Return the most probable states (n, order), by conjugate gradients that the factor preconditions.
 
         The factor loses digits where steps differ much in length or roughness. Repeated solutions with it then diverge;
-        conjugate gradients lower the energy with every step.
+        conjugate gradients lower the energy with every step, until rounding is all that is left.
         """
         states = np.zeros((self.count, self.order))
         nothing = self._gradient(states, precision, sigmas)
         gradient, direction = nothing, states
         before: tuple[Floats, float] = (states, 1.0)
+        least, rises = np.inf, 0
         for _ in range(MOST_REFINEMENTS):
             missing = sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(states.shape)
             decrement = float(np.vdot(gradient, missing))
-            if decrement < REFINED:
+            least, rises = min(decrement, least), rises + (decrement > least)
+            if decrement < REFINED or rises > 1:
                 break
             direction = missing + float(np.vdot(missing, gradient - before[0])) / before[1] * direction
             curvature = float(np.vdot(direction, nothing - self._gradient(direction, precision, sigmas)))
-            if not curvature > 0.0:  # nothing but rounding is left
+            if not curvature > 0.0:
                 break
             states = states + float(np.vdot(gradient, direction)) / curvature * direction
             before = gradient, decrement
