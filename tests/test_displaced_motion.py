@@ -192,7 +192,7 @@ def test_a_link_coasts_across_the_play_of_its_joint():
     """While it does its speed depends on the torque, not on the gap: the time is right for a gap of 1e-3 rad."""
     shown = Recorded()
     without = simulated(shown, mass=HEAVY)
-    with_play = simulated(shown, JointBacklash("joint2"), (1e-3, 0.0, 0.0), mass=HEAVY)
+    with_play = simulated(shown, JointBacklash("joint2"), (1e-3, 0.0, 0.0, 0.0, 0.0), mass=HEAVY)
     changed, carried = played(1e-3, 1) - without, with_play - without
     rates = changed[:, :3].ravel(), carried[:, :3].ravel()
     assert np.corrcoef(*rates)[0, 1] > 0.85
@@ -215,5 +215,5 @@ def test_a_link_with_friction_waits_until_its_joint_has_crossed_the_gap():
     shown = Recorded()
     without = simulated(shown, mass=HEAVY)
     changed = displaced_in_mujoco(model, 1, fine, np.array(link) - motor) - without
-    carried = simulated(shown, JointBacklash("joint2"), (0.0, gap, 0.0), mass=HEAVY) - without
+    carried = simulated(shown, JointBacklash("joint2"), (0.0, gap, 0.0, 0.0, 0.0), mass=HEAVY) - without
     assert np.corrcoef(changed[:, :3].ravel(), carried[:, :3].ravel())[0, 1] > 0.95

@@ -72,3 +72,8 @@ def test_a_leap_follows_the_encoder(flown, slow):
     shares = np.linalg.lstsq(leaps, -link, rcond=None)[0]
     assert shares.sum() == pytest.approx(gap, rel=0.05)
     assert np.abs(link + leaps @ shares).max() < 0.05 * gap
+
+
+def test_a_joint_that_never_reverses_has_no_turns():
+    speed = _Speed.of(measured(0.02 * TIMES), 0, 0.0, END)
+    assert (speed.first, speed.turns) == (1.0, ())

@@ -238,8 +238,10 @@ class _Speed:
         fine = _finely(begin, end)
         speed = np.asarray(motion.evaluate(fine).velocity)[:, index]
         first, changes = _reversals(fine, speed, SLOW)
+        if not changes:
+            return cls(motion, index, first, ())
         times = np.array([change.time for change in changes])
-        groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > BRIDGED) + 1) if len(times) else []
+        groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > BRIDGED) + 1)
         middles = [0.5 * float(times[group[0]] + times[group[-1]]) for group in groups]
         borders = [-np.inf, *(0.5 * (one + other) for one, other in pairwise(middles)), np.inf]
         turns = []
