@@ -66,6 +66,9 @@ class DiagnosisSettings:
     cannot_be_left_out : float
         Log evidence of a cause added to the others of a fit from which no linear model can omit it [nats]: that of ten
         standard deviations.
+    not_linear : float
+        Share of the log evidence of the largest cause of such a fit that the linear model may get wrong: a tenth of a
+        per cent, the square of changes of three per cent.
     plausible : float
         Probability from which a vibration is tuned and fitted, and the instants of a jump are searched for.
     vibration_far_behind : float
@@ -109,6 +112,7 @@ class DiagnosisSettings:
     agrees: float = 0.5
     most_linearisations: int = 3
     cannot_be_left_out: float = 50.0
+    not_linear: float = 1e-3
     plausible: float = 0.01
     vibration_far_behind: float = 40.0
     restart_from: float = 20.0

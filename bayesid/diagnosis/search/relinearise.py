@@ -21,6 +21,7 @@ from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.fitted_set import Hypothesis, fit_hypothesis, fit_in_amplitudes
 from bayesid.diagnosis.search.linearisation import Catalogue, linearise, linearise_along_data
+from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["SetSearch", "plausible_vibrations", "search_sets", "with_fitted_vibrations"]
@@ -144,20 +145,23 @@ def _about_large_causes(
             break
         fitted.add(names)
         point = _with_suggested(linearise(base.perturbed, fit, catalogue, far=True))
-        large = _large(point, names, catalogue.settings.cannot_be_left_out)
+        large = _large(point, names, catalogue.settings)
         near[large] = _Near(point, enumerate_sets(point.evidence, catalogue.prior, beside=large))
         probabilities = _nearest(_Near(base, along), near, point.log_nothing)
     return point, probabilities
 
 
-def _large(point: Linearisation, names: frozenset[str], least: float) -> frozenset[str]:
-    """Return the causes of a fit without which its motion would be another: bodies do not make up for them."""
+def _large(point: Linearisation, names: frozenset[str], settings: DiagnosisSettings) -> frozenset[str]:
+    """Return the causes of a fit without which its motion would be another: bodies do not make up for them.
+
+    Beside a cause that moves the base far, a small one takes up what the linear model gets wrong of it.
+    """
     evidence = point.with_bodies_fixed().evidence
     rest = {name: names - {name} for name in names}
     whole = evidence.log_evidence(names)
-    return frozenset(
-        name for name, others in rest.items() if whole - (evidence.log_evidence(others) if others else 0.0) > least
-    )
+    lost = {name: whole - (evidence.log_evidence(others) if others else 0.0) for name, others in rest.items()}
+    least = max(settings.cannot_be_left_out, settings.not_linear * max(lost.values()))
+    return frozenset(name for name, loss in lost.items() if loss > least)
 
 
 class _Near(NamedTuple):
