@@ -134,12 +134,12 @@ def _best_by_others(
     """Return the best manoeuvres by the criteria from which another starts (`Criterion.starts_from`)."""
     whole = with_starts(problem)
     others = [other for other in whole.criteria if other.name in criterion.starts_from]
-    found = []
+    best = []
     for other, stream in zip(others, seed.spawn(len(others)), strict=True):
         known = store.of(other.name)
         rng = np.random.default_rng(stream)
-        found.append(optimise(whole, other, rng, search, known=known.known, keep=known.keep).parameters)
-    return found
+        best.append(optimise(whole, other, rng, search, known=known.known, keep=known.keep).parameters)
+    return best
 
 
 def _made_smaller(problem: Problem, criterion: Criterion, last: Attempt, draws: np.random.SeedSequence) -> Attempt:
