@@ -14,7 +14,7 @@ import scipy.linalg as sla
 from bayesid._io.errors import InputError
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening, apply, build
+from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening, Window, apply, build
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
@@ -59,6 +59,8 @@ def dense(noise: SampleNoise) -> np.ndarray:
                     total[early, :, late] += block.T
     for index, channel in enumerate(noise.channels):
         total[np.arange(count), index, np.arange(count), index] += channel.sigma**2
+        level, memory = channel.coloured
+        total[:, index, :, index] += level**2 * np.exp(-np.abs(noise.time[:, None] - noise.time) / memory)
     return total.reshape(count * channels, -1)
 
 
@@ -77,15 +79,17 @@ LOW = Filter(0.25, 3)
 CASES = {
     "plain": [NoiseChannel(1e-5, EVERY, Filter()), NoiseChannel(2e-5, EVERY, Filter())],
     "different rows": [NoiseChannel(1e-5, EVERY, Filter()), NoiseChannel(2e-5, SOME, Filter())],
+    "one coloured": [NoiseChannel(1e-5, EVERY, Filter(), (2e-5, 3.0)), NoiseChannel(2e-5, SOME, Filter())],
+    "filtered and coloured": [NoiseChannel(1e-5, EVERY, LOW, (2e-5, 2.0)), NoiseChannel(2e-5, SOME, Filter())],
     "filtered": [NoiseChannel(1e-5, EVERY, LOW), NoiseChannel(2e-5, EVERY, Filter(0.4, 2))],
 }
 
 
-@pytest.mark.parametrize("case", ["plain", "different rows"])
+@pytest.mark.parametrize("case", ["plain", "different rows", "one coloured"])
 def test_with_the_full_window_it_is_the_exact_gaussian(case):
     """Log determinant and quadratic form of the dense covariance over the samples that exist, to rounding."""
     noise = noise_model(CASES[case])
-    result = build(noise, window=len(TIME))
+    result = build(noise, Window(len(TIME)))
     present = np.zeros((len(TIME), len(noise.channels)), dtype=bool)
     for index, channel in enumerate(noise.channels):
         present[channel.rows, index] = True
@@ -103,7 +107,7 @@ def test_with_the_full_window_it_is_the_exact_gaussian(case):
 def test_with_the_full_window_outputs_are_white(case):
     """The covariance of all outputs is the identity, filters and decimation included."""
     noise = noise_model(CASES[case])
-    matrix = operator(build(noise, window=len(TIME)), len(TIME))
+    matrix = operator(build(noise, Window(len(TIME))), len(TIME))
     np.testing.assert_allclose(matrix @ dense(noise) @ matrix.T, np.eye(len(matrix)), atol=1e-7)
 
 
@@ -111,12 +115,12 @@ def test_with_the_full_window_outputs_are_white(case):
 def test_the_chosen_window_is_long_enough(case):
     """Each output has unit variance whatever the window; the log determinant is exact to 1e-3 per scalar."""
     noise = noise_model(CASES[case])
-    chosen, exact = build(noise), build(noise, window=len(TIME))
+    chosen, exact = build(noise), build(noise, Window(len(TIME)))
     matrix = operator(chosen, len(TIME))
     covariance = matrix @ dense(noise) @ matrix.T
     np.testing.assert_allclose(np.diag(covariance), 1.0, atol=1e-9)
     assert 0.0 <= chosen.log_sigma - exact.log_sigma + 1e-9 < 1e-3 * exact.samples
-    assert build(noise, window=0).log_sigma > chosen.log_sigma + 1e-3 * exact.samples  # correlation is there
+    assert build(noise, Window(0)).log_sigma > chosen.log_sigma + 1e-3 * exact.samples  # correlation is there
 
 
 def test_filtered_noise_is_white_in_a_monte_carlo():
@@ -141,7 +145,7 @@ def test_a_filter_does_not_reach_across_a_gap():
     rows = np.delete(np.arange(len(time)), gap)
     plain = Filter(0.25)
     noise = SampleNoise(time, [NoiseChannel(1.0, rows, plain)])
-    result = build(noise, window=0)
+    result = build(noise, Window(0))
     half = len(plain.taps(0.5)) // 2
     expected = [*range(half, 50 - half), *range(60 + half, len(time) - half)]
     np.testing.assert_array_equal(result.rows, expected)
@@ -274,7 +278,7 @@ def test_clean_data_have_a_chi_square_near_one_where_the_encoder_dominates():
 def test_what_is_left_out_is_in_no_sum():
     """The last samples left out: log determinant and scalars are those of the covariance of the others."""
     noise = noise_model(CASES["plain"])
-    whole = build(noise, window=len(TIME))
+    whole = build(noise, Window(len(TIME)))
     gone = np.zeros_like(whole.outputs)
     gone[-7:] = True
     rest = whole.without(gone)

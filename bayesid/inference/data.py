@@ -17,7 +17,7 @@ from bayesid.inference import whitening
 from bayesid.inference.compiled import Arrays, Averaging
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity, wheel_sensitivity
 from bayesid.inference.wheel_noise import wheel_errors
-from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening
+from bayesid.inference.whitening import MotionErrors, NoiseChannel, SampleNoise, Whitening, Window
 from bayesid.recording.actions import Actions
 from bayesid.recording.blocks import Blocks
 from bayesid.recording.full_rate import spikes
@@ -482,7 +482,7 @@ class RecordedSamples:
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
         return sensor.noise.sigma(self.blocks[kind.value].interval)
 
-    def noise_model(self, robot: Robot, seen: SampledMotion, window: int | None = None) -> SampleNoise:
+    def noise_model(self, robot: Robot, seen: SampledMotion, window: Window | None = None) -> SampleNoise:
         """Return the second moments of the errors.
 
         Parameters
@@ -491,8 +491,8 @@ class RecordedSamples:
             Robot whose dynamics carries the encoders' noise to the sensors.
         seen : SampledMotion
             Motion of the base on the grid.
-        window : int, optional
-            Number of earlier blocks that samples are conditioned on, where it is known.
+        window : Window, optional
+            Earlier blocks that samples are conditioned on, where they are known.
         """
         torque_sigma = () if self.torque_sensor is None else self.torque_sensor.sigma
         channels = [channel for sensor in self.sensors for channel in self._noise_channels(sensor)]
@@ -503,7 +503,7 @@ class RecordedSamples:
             channels.append(NoiseChannel(sigma * relative[used], rows, Filter()))
         state = self.motion.evaluate(self.time)
         torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
-        alone = window == 0 and all(sensor.filter == Filter() for sensor in self.sensors)
+        alone = window is not None and window.longest == 0 and all(sensor.filter == Filter() for sensor in self.sensors)
         lags = 0 if alone else min(max(whitening.WINDOWS), len(self.time) - 1)
         errors = []
         if isinstance(self.motion, MeasuredMotion) and robot.joints:

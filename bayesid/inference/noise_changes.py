@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayesid._math.arrays import Floats
 from bayesid.inference.data import Data, grids_of, with_whitenings
 from bayesid.inference.posterior import Posterior, whiten
-from bayesid.inference.whitening import Whitening
+from bayesid.inference.whitening import Whitening, Window
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import Sensor
@@ -103,7 +103,7 @@ def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Po
     return Posterior.of(posterior.model, manoeuvres, step=posterior.step, flat_prior=posterior.flat_prior)
 
 
-def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[int | None]) -> list[Whitening]:
+def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[Window | None]) -> list[Whitening]:
     """Return the whitenings of the noise at ``z``; what the data leave out stays left out."""
     grids = grids_of(data.model, data.manoeuvres, data.recorded, data.step)
     whitenings = whiten(

@@ -26,7 +26,7 @@ from bayesid.inference.encoder_noise import SampledMotion
 from bayesid.inference.integration_step import choose_step, simulate_padded
 from bayesid.inference.memory_estimate import refuse_large_recordings
 from bayesid.inference.unknowns import Unknowns
-from bayesid.inference.whitening import Whitening
+from bayesid.inference.whitening import Whitening, Window
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
@@ -111,7 +111,7 @@ class Posterior(ShortForm):
         start = starting_point(unknowns, recorded)
         chosen = choose_step(model, manoeuvres, recorded, structure, numbers, start) if step is None else step
         grids = grids_of(model, manoeuvres, recorded, chosen)
-        windows = None if window is None else [window] * len(recorded)
+        windows = None if window is None else [Window(window)] * len(recorded)
         whitenings = whiten(model, recorded, grids, manoeuvres, unknowns, structure, numbers, start, windows)
         arrays = stacked(model, manoeuvres, recorded, grids, whitenings)
         left_out = tuple(np.zeros_like(whitening.outputs) for whitening in whitenings)
@@ -333,7 +333,7 @@ def whiten(
     structure: Structure,
     numbers: Numbers,
     z: Floats,
-    windows: Sequence[int | None] | None = None,
+    windows: Sequence[Window | None] | None = None,
 ) -> list[Whitening]:
     """Return the whitening of every recording.
 
@@ -341,8 +341,8 @@ def whiten(
     ----------
     z : (size,) array
         Linearisation point of the robot and its motion.
-    windows : (R,) sequence of int or None, optional
-        Number of earlier blocks to condition on; None takes the smallest number that is accurate.
+    windows : (R,) sequence of Window or None, optional
+        Earlier blocks to condition on; None takes the shortest window that is accurate.
 
     Returns
     -------

@@ -8,7 +8,7 @@ result tends to the exact Gaussian as the window grows and is positive definite 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import jax
@@ -22,7 +22,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid.simulation.sensors import Filter
 
-__all__ = ["MotionErrors", "NoiseChannel", "SampleNoise", "Whitening", "apply", "build"]
+__all__ = ["MotionErrors", "NoiseChannel", "SampleNoise", "Whitening", "Window", "apply", "build"]
 
 
 WINDOWS = (0, 2, 4, 8, 16, 32)
@@ -36,6 +36,9 @@ SLOW = 0.01
 
 What is learnt of bodies changes slowly, and sees the noise's density at low frequency, to which many lags add.
 """
+
+NO_COLOUR = (0.0, 1.0)
+"""Standard deviation and correlation time of coloured noise where there is none."""
 
 LARGEST = 4_000_000
 """Number of entries of the covariances that are factorised together."""
@@ -63,7 +66,7 @@ class NoiseChannel(NamedTuple):
     sigma: float | Floats
     rows: Integers
     filter: Filter
-    coloured: tuple[float, float] = (0.0, 1.0)
+    coloured: tuple[float, float] = NO_COLOUR
     averaged: Integers | None = None
     interval: float = 0.0
 
@@ -144,6 +147,26 @@ class SampleNoise:
         return max((errors.covariance.shape[1] - 1 for errors in self.errors), default=0)
 
 
+class Window(NamedTuple):
+    """Numbers of earlier blocks on which each block is conditioned.
+
+    Attributes
+    ----------
+    every : int
+        Those of which every channel counts.
+    coloured : int
+        Those of which the channels with coloured noise count; their memory is longer than that of the joint motion.
+    """
+
+    every: int
+    coloured: int = 0
+
+    @property
+    def longest(self) -> int:
+        """The larger of the two."""
+        return max(self)
+
+
 class Whitening(NamedTuple):
     """Banded operator that makes O blocks of C whitened scalars of the residual.
 
@@ -161,8 +184,8 @@ class Whitening(NamedTuple):
         Mask of the scalars that exist.
     rows : (O,) integer array
         Row of the sample grid to which each block belongs.
-    window : int
-        Number of earlier blocks on which each block is conditioned.
+    window : Window
+        Earlier blocks on which each block is conditioned.
     """
 
     weights: Floats
@@ -171,7 +194,7 @@ class Whitening(NamedTuple):
     samples: int
     outputs: NDArray[np.bool_]
     rows: Integers
-    window: int
+    window: Window
 
     @property
     def log_sigma(self) -> float:
@@ -212,14 +235,14 @@ def apply(weights: Array, start: Array, residual: Array) -> Array:
     return jnp.einsum("oiwj,owj->oi", weights, windows)
 
 
-def build(noise: SampleNoise, window: int | None = None) -> Whitening:
+def build(noise: SampleNoise, window: Window | None = None) -> Whitening:
     """Return the whitening of one recording, by default with the shortest window that is accurate.
 
     Parameters
     ----------
     noise : SampleNoise
-    window : int, optional
-        Number of earlier blocks on which each sample is conditioned.
+    window : Window, optional
+        Earlier blocks on which each block is conditioned.
     """
     outputs = _outputs(noise)
     with threadpool_limits(limits=1):  # threads only slow down thousands of small factorisations
@@ -227,11 +250,21 @@ def build(noise: SampleNoise, window: int | None = None) -> Whitening:
 
 
 def _shortest(noise: SampleNoise, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
-    available = max(WINDOWS) if _is_coloured(noise) else noise.lags
-    best = _whiten(noise, outputs, 0)
-    for window in WINDOWS[1:]:
-        if window > available:
-            break
+    white = replace(noise, channels=[channel._replace(coloured=NO_COLOUR) for channel in noise.channels])
+    windows = [Window(every) for every in WINDOWS if every <= noise.lags]
+    best = _first_accurate(white, outputs, windows)
+    if not any(_is_coloured(channel) for channel in noise.channels):
+        return best
+    every = best.window.every
+    return _first_accurate(noise, outputs, [Window(every, coloured) for coloured in WINDOWS if coloured >= every])
+
+
+def _first_accurate(
+    noise: SampleNoise, outputs: list[tuple[int, list[_Output]]], windows: Sequence[Window]
+) -> Whitening:
+    """Return the whitening with the first of some windows that the next one hardly improves."""
+    best = _whiten(noise, outputs, windows[0])
+    for window in windows[1:]:
         longer = _whiten(noise, outputs, window)
         alike = abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1)
         before, after = _of_constants(best), _of_constants(longer)
@@ -283,26 +316,25 @@ def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
     return result
 
 
-def _whiten(noise: SampleNoise, blocks: list[tuple[int, list[_Output]]], window: int) -> Whitening:
+def _whiten(noise: SampleNoise, blocks: list[tuple[int, list[_Output]]], window: Window) -> Whitening:
     channels = len(noise.channels)
     spans = [(min(o.rows[0] for o in group), max(o.rows[-1] for o in group)) for _, group in blocks]
     first = np.minimum.accumulate(np.array([span[0] for span in spans])[::-1])[::-1]
-    starts = [int(first[max(0, number - window)]) for number in range(len(blocks))]
+    starts = [int(first[max(0, number - window.longest)]) for number in range(len(blocks))]
     width = max(spans[number][1] - starts[number] + 1 for number in range(len(blocks)))
     weights = np.zeros((len(blocks), channels, width, channels))
     present = np.zeros((len(blocks), channels), dtype=bool)
     covariance = _Covariance(noise, width - 1)
     log_sigmas = np.zeros(present.shape)
-    for local, numbers in _alike(blocks, starts, window, channels):
-        group = blocks[numbers[0]][1]
-        rows = 1 + int(local.columns.max()) // channels
-        slots = [output.channel for output in group]
-        count = max(1, LARGEST // (rows * channels) ** 2)
+    for local, numbers in _alike(noise, blocks, starts, window):
+        slots = [output.channel for output in blocks[numbers[0]][1]]
+        combine, columns = local.combination
+        rows, channel = np.divmod(columns, channels)
+        count = max(1, LARGEST // len(columns) ** 2)
         for part in (numbers[k : k + count] for k in range(0, len(numbers), count)):
-            raw = covariance.between(np.array([starts[number] for number in part]), rows)
-            whitened, logs = _given_earlier(raw, local, len(group))
-            places = np.ix_(part, slots, range(rows))
-            weights[places] = whitened.reshape(len(part), len(group), rows, channels)
+            raw = covariance.among(np.array([starts[number] for number in part]), rows, channel)
+            whitened, logs = _given_earlier(raw, combine, len(slots))
+            weights[np.array(part)[:, None, None], np.array(slots)[:, None], rows, channel] = whitened
             present[np.ix_(part, slots)] = True
             log_sigmas[np.ix_(part, slots)] = logs
     return Whitening(
@@ -349,44 +381,53 @@ class _Local(NamedTuple):
         return cls(columns, np.concatenate([part.taps for part in parts]), scalar)
 
     @property
+    def combination(self) -> tuple[Floats, Integers]:
+        """Return the weights (n, m) by which the scalars combine m columns, and these columns."""
+        columns, place = np.unique(self.columns, return_inverse=True)
+        combine = np.zeros((int(self.scalar[-1]) + 1, len(columns)))
+        combine[self.scalar, place] = self.taps
+        return combine, columns
+
+    @property
     def key(self) -> bytes:
         """Content, to compare by."""
         return b"|".join(part.tobytes() for part in self)
 
 
 def _alike(
-    blocks: list[tuple[int, list[_Output]]], starts: Sequence[int], window: int, channels: int
+    noise: SampleNoise, blocks: list[tuple[int, list[_Output]]], starts: Sequence[int], window: Window
 ) -> list[tuple[_Local, list[int]]]:
     """Return the windows that differ, each with the numbers of the blocks that have it."""
+    channels = len(noise.channels)
     single = [_Local.of(group, channels) for _, group in blocks]
+    far: list[_Local | None] = []
+    if window.coloured > window.every:
+        slow = [[o for o in group if _is_coloured(noise.channels[o.channel])] for _, group in blocks]
+        far = [_Local.of(group, channels) if group else None for group in slow]
     windows: dict[tuple[bytes, int], tuple[_Local, list[int]]] = {}
     for number, start in enumerate(starts):
-        local = _Local.joined(single[max(0, number - window) : number + 1], start * channels)
+        near = max(0, number - window.every)
+        before = [part for part in far[max(0, number - window.coloured) : near] if part is not None]
+        local = _Local.joined([*before, *single[near : number + 1]], start * channels)
         key = (local.key, len(blocks[number][1]))
         windows.setdefault(key, (local, []))[1].append(number)
     return list(windows.values())
 
 
-def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, Floats]:
-    """Return the weights (B, new, n) that whiten the last scalars of windows given the others, and their log sigmas.
+def _given_earlier(raw: Floats, combine: Floats, new: int) -> tuple[Floats, Floats]:
+    """Return the weights (B, new, m) that whiten the last scalars of windows given the others, and their log sigmas.
 
     Parameters
     ----------
-    raw : (B, n, n) array
-        Covariance of each window's flattened residual.
-    local : _Local
-        All scalars of a window.
+    raw : (B, m, m) array
+        Covariance of what enters each window.
+    combine : (n, m) array
+        Weights by which it makes all scalars of a window.
     new : int
         Number of scalars of the last block.
     """
-    count = int(local.scalar[-1]) + 1
-    combine = np.zeros((count, raw.shape[-1]))
-    combine[local.scalar, local.columns] = local.taps
-    if len(local.columns) == count and (local.taps == 1.0).all():
-        among = raw[:, local.columns][:, :, local.columns]
-    else:
-        among = combine @ raw @ combine.T
-    old = count - new
+    among = raw if np.array_equal(combine, np.eye(len(combine))) else combine @ raw @ combine.T
+    old = len(combine) - new
     gain = np.linalg.solve(among[:, :old, :old], among[:, :old, old:])
     left = among[:, old:, old:] - np.swapaxes(among[:, :old, old:], 1, 2) @ gain
     factor = np.linalg.cholesky(left)
@@ -395,8 +436,8 @@ def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, Floats
     return rows @ combine, np.log(np.diagonal(factor, axis1=1, axis2=2))
 
 
-def _is_coloured(noise: SampleNoise) -> bool:
-    return any(channel.coloured[0] > 0.0 for channel in noise.channels)
+def _is_coloured(channel: NoiseChannel) -> bool:
+    return channel.coloured[0] > 0.0
 
 
 class _Covariance:
@@ -421,22 +462,25 @@ class _Covariance:
         )
         self._coloured = [channel.coloured_moments(count) for channel in noise.channels]
 
-    def between(self, starts: Integers, rows: int) -> Floats:
-        """Return the dense covariances (B, n, n) of some rows from each of the starts on, row by row of C channels."""
-        row = starts[:, None] + np.arange(rows)
-        apart = np.arange(rows)[:, None] - np.arange(rows)[None, :]
-        lag = np.abs(apart)
-        block = self._blocks[np.minimum(lag, self._lags), np.maximum(row[:, :, None], row[:, None, :])]
-        block[:, lag > self._lags] = 0.0
-        block[:, apart < 0] = np.swapaxes(block[:, apart < 0], -1, -2)
-        time = self._noise.time[row]
-        for index, channel in enumerate(self._noise.channels):
-            level, memory = channel.coloured
+    def among(self, starts: Integers, rows: Integers, channels: Integers) -> Floats:
+        """Return the covariances (B, m, m) of m readings, whose rows count from each of the starts on."""
+        earlier = rows[:, None] < rows[None, :]
+        channel = np.meshgrid(channels, channels, indexing="ij")
+        later, other = np.where(earlier, channel[::-1], channel)
+        lag = np.abs(rows[:, None] - rows[None, :])
+        last = starts[:, None, None] + np.maximum(rows[:, None], rows[None, :])
+        covariance = self._blocks[np.minimum(lag, self._lags), last, later, other]
+        covariance[:, lag > self._lags] = 0.0
+        for index, channel_noise in enumerate(self._noise.channels):
+            level, memory = channel_noise.coloured
             if level > 0.0:
+                of_it = np.flatnonzero(channels == index)
+                row = starts[:, None] + rows[of_it]
+                time = self._noise.time[row]
                 between = np.abs(time[:, :, None] - time[:, None, :])
                 log_gain, variance = (moment[row] for moment in self._coloured[index])
                 gain = log_gain[:, :, None] + log_gain[:, None, :]
-                correlation = np.where(apart == 0, variance[:, :, None], np.exp(gain - between / memory))
-                block[..., index, index] += level**2 * correlation
-        size = rows * self._channels
-        return np.swapaxes(block, 2, 3).reshape(len(starts), size, size)
+                same = np.eye(len(of_it), dtype=bool)
+                correlation = np.where(same, variance[:, :, None], np.exp(gain - between / memory))
+                covariance[np.ix_(np.arange(len(starts)), of_it, of_it)] += level**2 * correlation
+        return covariance

@@ -181,7 +181,7 @@ def _motion_sentence(posterior: Posterior) -> str:
     measured = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
     if not measured:
         return "The motion of the joints is prescribed and exact."
-    window = max(item.window for item in posterior.whitenings)
+    window = max(item.window.every for item in posterior.whitenings)
     reach = f"correlated over up to {window} samples" if window else "with negligible correlation between samples"
     jumps = sum(len(joint.jumps) for motion in measured for joint in motion.joints)
     free = f" that permits {counted(jumps, 'jump')} of acceleration or jerk" if jumps else ""

@@ -330,7 +330,7 @@ def _measured(*, full: bool, seed: int) -> Benchmark:
             for interval in (1.0, 0.5, 0.2, 0.1)
         },
         whitening={name: seconds_per_evaluation(posterior, repeats) for name, posterior in posteriors.items()},
-        windows={name: posterior.whitenings[0].window for name, posterior in posteriors.items()},
+        windows={name: posterior.whitenings[0].window.longest for name, posterior in posteriors.items()},
         sampling=compare_moves(
             posterior_of(robot, recordings=3), effective=4000.0, default_steps=12000 if full else 600, seed=seed
         ),
