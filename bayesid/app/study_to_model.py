@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
@@ -191,6 +192,7 @@ def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tup
     return (*known, *links), carried.mixing(links)
 
 
+@threadpool_limits.wrap(limits=1)  # sums of several threads are slower here, and rounded by chance
 def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress = silent) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion.
 

@@ -6,6 +6,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
@@ -60,6 +62,7 @@ class StudyCheck(ShortForm):
         }
 
 
+@threadpool_limits.wrap(limits=1)  # sums of several threads are slower here, and rounded by chance
 def check(study: StudySource | Posterior, *, progress: Progress = silent) -> StudyCheck:
     """Check a study and its recordings: rates, gaps, noise, clocks, and joints that hardly move.
 
