@@ -20,6 +20,7 @@ import numpy as np
 import scipy.linalg as sla
 from scipy.interpolate import PPoly
 from scipy.optimize import minimize, minimize_scalar
+from scipy.sparse import csr_array
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.blocks import Blocks
@@ -520,6 +521,7 @@ class _Observed(NamedTuple):
     value: Floats  #: samples, (n,)
     row: Floats  #: derivatives of each sample in that state, (n, order)
     relative: Floats  #: standard deviation of each sample over that of the series, (n,)
+    matrix: csr_array  #: the same derivatives in the states of all nodes, (n, nodes x order)
 
     @classmethod
     def of(cls, series: JointSamples, nodes: Floats, scale: float, order: int) -> _Observed:
@@ -532,11 +534,13 @@ class _Observed(NamedTuple):
             for power in range(1, order - series.derivative):
                 terms = [math.comb(power, k) * moments[:, k : k + 1] * lag ** (power - k) for k in range(power + 1)]
                 row[:, series.derivative + power] = np.sum(terms, axis=0)[:, 0] / (math.factorial(power) * scale**power)
-        return cls(series.derivative, node, series.value * scale**series.derivative, row, series.relative)
+        columns, starts = order * node[:, None] + np.arange(order), order * np.arange(len(node) + 1)
+        matrix = csr_array((row.ravel(), columns.ravel(), starts), shape=(len(node), order * len(nodes)))
+        return cls(series.derivative, node, series.value * scale**series.derivative, row, series.relative, matrix)
 
     def miss(self, states: Floats) -> Floats:
         """Return samples less what the states (n, order) say of them."""
-        return self.value - (self.row * states[self.node]).sum(axis=1)
+        return np.asarray(self.value - self.matrix @ states.ravel())
 
     def information(self, count: int) -> Floats:
         """Return the information on the states of all nodes for a noise of one, (count, order, order)."""
@@ -656,5 +660,6 @@ class _Problem:
         gradient[:-1] += np.einsum("kji,kj->ki", self.process.transition, force)
         gradient[0] -= self.initial * (states[0] - self.initial_mean)
         for one, sigma in zip(self.series, sigmas, strict=True):
-            np.add.at(gradient, one.node, one.row * (one.miss(states) / (sigma * one.relative) ** 2)[:, None])
+            pull = one.matrix.T @ (one.miss(states) / (sigma * one.relative) ** 2)
+            gradient += pull.reshape(gradient.shape)
         return gradient
