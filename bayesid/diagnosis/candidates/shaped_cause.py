@@ -19,7 +19,7 @@ from bayesid._math.arrays import Floats, log_sum
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseAmplitude, CauseKind
 from bayesid.diagnosis.candidates.courses import half_chi2
 from bayesid.diagnosis.candidates.linear_model import Linearisation, Remaining, SignatureBank, Signatures
-from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
@@ -33,7 +33,8 @@ SHARE = 0.5
 """Prior probability of tuned shapes; the rest is that of the forms of the bank."""
 
 COMPANIES = 3
-"""Sets of other causes, none among them, beside which shapes are proposed where something generic gains there."""
+"""Most probable sets of other causes, none among them, beside which shapes are proposed where something generic gains
+there."""
 
 WORTH = 6.0
 """Nats that a proposal must earn beyond its prior to be tuned: what a cause has to earn to be named is 8."""
@@ -161,7 +162,7 @@ class ShapedCause(CauseKind):
                 log_others = evidence.log_evidence(causes) if causes else 0.0
                 proposals = self.proposals(point, effect, causes)
                 tuned += [(log_others + proposal.worth, causes, proposal) for proposal in proposals]
-            worth_it = [trial for trial in tuned if trial[2].worth > WORTH]
+            worth_it = [trial for trial in tuned if trial[2].worth > WORTH and _near(likeliest, trial[0], trial[2])]
             tuned = _with_exact_gains(point, worth_it)
             if not tuned:
                 continue
@@ -169,7 +170,7 @@ class ShapedCause(CauseKind):
             forms: list[tuple[AmplitudeGroup, ...]] = []
             log_shares = []
             for total, causes, proposal in self._best_by_company(tuned):
-                if total < likeliest - max(WORTH, LOST * proposal.gain):
+                if not _near(likeliest, total, proposal):
                     continue
                 tuning = self._tuned(point, proposal, causes, likeliest - total + proposal.gain)
                 if tuning is None:
@@ -305,6 +306,11 @@ class ShapedCause(CauseKind):
         return numbers_of_shape
 
 
+def _near(likeliest: float, total: float, proposal: ShapeProposal) -> bool:
+    """Return whether a proposal may reach the log probability of the most probable set once it is tuned."""
+    return total >= likeliest - max(WORTH, LOST * proposal.gain)
+
+
 def _with_exact_gains(
     point: Linearisation, trials: Sequence[tuple[float, tuple[str, ...], ShapeProposal]]
 ) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
@@ -325,14 +331,22 @@ def _with_exact_gains(
 
 
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
-    """Return nothing and the most probable sets of other causes, without anything generic."""
+    """Return nothing, the most probable sets of other causes, and what is most probable beside something generic.
+
+    All of the most probable sets may hold a cause that stands for the shape. Something generic stands for it as well.
+    """
     companies: dict[tuple[str, ...], None] = {(): None}
     for cause_set in probabilities.sets:
         if cause_set.generic is None:
-            companies[tuple(name for name in cause_set.causes if name not in mine)] = None
+            companies[_others(cause_set, mine)] = None
         if len(companies) == COMPANIES:
             break
-    return list(companies)
+    unnamed = next((cause_set for cause_set in probabilities.sets if cause_set.generic is not None), None)
+    return list(companies if unnamed is None else companies | {_others(unnamed, mine): None})
+
+
+def _others(cause_set: CauseSet, mine: set[str]) -> tuple[str, ...]:
+    return tuple(name for name in cause_set.causes if name not in mine)
 
 
 def _something_left(evidence: SetEvidence, causes: Sequence[str]) -> bool:
