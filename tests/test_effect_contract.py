@@ -266,7 +266,7 @@ def check_jumps(effect: Effect, hook: str) -> None:
     (when,) = effect.jumps(TIMES[-1])
     if isinstance(effect, Events):
         environment = instant().environment
-        begun = [float(effect.begun(environment._replace(time=when + after))[0]) for after in (0.0, 1e-9)]
+        begun = [float(effect.begun(when + after, environment.recording)[0]) for after in (0.0, 1e-9)]
         assert begun == [0.0, 1.0]
         return
     table = effect.table(ROBOT, SWING, np.array([0.0, when, when + 1e-9, TIMES[-1]]))

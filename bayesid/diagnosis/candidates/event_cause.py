@@ -1,4 +1,9 @@
-"""Kind of the causes that are events, such as kicks, snaps of a panel and jumps of a sensor's bias."""
+"""Kind of the causes that are events, such as kicks, snaps of a panel and jumps of a sensor's bias.
+
+Separate events have amplitudes of their own, which a cause with few amplitudes in all recordings, such as a leak, need
+not pay for. Events that may recur (`Events.recurs`) are therefore sought in a second way: at one instant of every
+recording, with the same amplitudes.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +21,7 @@ from bayesid.diagnosis.settings import FULL
 from bayesid.simulation.effects.bias_jump import BiasJump
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
-from bayesid.simulation.effects.events import Event, Events
+from bayesid.simulation.effects.events import EVERY, Event, Events
 from bayesid.simulation.effects.thermal_snap import ThermalSnap
 
 __all__ = ["EventCause"]
@@ -33,9 +38,12 @@ MOST = 6
 EARNED = 4.0
 """Nats that a further event must earn beyond the number of places where it could be."""
 
+WAYS = 2
+"""Ways in which events come that may recur, equally probable: each by itself, or alike in every recording."""
+
 
 class EventCause(ShapedCause):
-    """Causes that happen once or a few times in each recording, each time with amplitudes of their own."""
+    """Causes that happen once or a few times in each recording, each time with amplitudes of their own or all alike."""
 
     name = "event"
 
@@ -61,25 +69,15 @@ class EventCause(ShapedCause):
         courses = CourseGram.of(point, group, causes)
         if courses is None:
             return []
-        earned: list[tuple[float, Event]] = []
-        for recording in range(len(courses.ends)):
-            earned += _events(courses, events, recording)
-        chosen = sorted(earned, key=lambda event: -event[0])[:MOST]
-        total = float(courses.ends.sum())
-        each = float(np.log(TRIED * len(courses.ends) * len(events.trial_shapes)))
-        decays = [shape[0] for shape in events.trial_shapes if shape]
-        result = []
-        for count in sorted({1, len(chosen)} if chosen else ()):
-            # so many events, in any order, with each number of them half as probable as one less
-            log_share = float(np.log(np.arange(1, count + 1)).sum()) - count * float(np.log(2.0))
-            widths = np.full(count, total)
-            if decays:  # kept or given back
-                log_share -= count * float(np.log(2.0))
-                widths = np.concatenate([widths, np.full(count, max(decays))])
-            named = events.with_events(sorted(event for _, event in chosen[:count]))
-            gain = sum(gain for gain, _ in chosen[:count])
-            result.append(ShapeProposal(named, gain, log_share - count * each, widths, log_share))
-        return result
+        recordings = range(len(courses.ends))
+        apart = [event for recording in recordings for event in _events(courses, events, recording)]
+        if not events.recurs or len(recordings) == 1:
+            return _proposals(events, apart, float(courses.ends.sum()), len(recordings), 0.0)
+        alike = _events(courses, events, EVERY)
+        return [
+            *_proposals(events, apart, float(courses.ends.sum()), len(recordings), -float(np.log(WAYS))),
+            *_proposals(events, alike, float(courses.ends.min()), 1, -float(np.log(WAYS))),
+        ]
 
     def shape(self, effect: Effect) -> tuple[Floats, Floats]:
         """Return the instants of all events, then their decays."""
@@ -115,14 +113,37 @@ class EventCause(ShapedCause):
         return [Quantity(f"{key}{kind}", "s") for kind in kinds for key in events.keys]
 
 
+def _proposals(
+    effect: Events, earned: Sequence[tuple[float, Event]], duration: float, recordings: int, log_way: float
+) -> list[ShapeProposal]:
+    """Return the best by itself and all together of events that may be anywhere in recordings of some duration [s]."""
+    chosen = sorted(earned, key=lambda event: -event[0])[:MOST]
+    each = float(np.log(TRIED * recordings * len(effect.trial_shapes)))
+    decays = [shape[0] for shape in effect.trial_shapes if shape]
+    result = []
+    for count in sorted({1, len(chosen)} if chosen else ()):
+        # so many events, in any order, with each number of them half as probable as one less
+        log_share = log_way + float(np.log(np.arange(1, count + 1)).sum()) - count * float(np.log(2.0))
+        widths = np.full(count, duration)
+        if decays:  # kept or given back
+            log_share -= count * float(np.log(2.0))
+            widths = np.concatenate([widths, np.full(count, max(decays))])
+        named = effect.with_events(sorted(event for _, event in chosen[:count]))
+        gain = sum(gain for gain, _ in chosen[:count])
+        result.append(ShapeProposal(named, gain, log_share - count * each, widths, log_share))
+    return result
+
+
 def _events(courses: CourseGram, effect: Events, recording: int) -> list[tuple[float, Event]]:
-    """Return the events of one recording that earn their places, one after another, with what each gains."""
-    end = float(courses.ends[recording])
+    """Return the events of one or of every recording that earn their places, one after another, and what each gains."""
+    within = range(len(courses.ends)) if recording == EVERY else [recording]
+    end = float(courses.ends[within].min())
     instants = end * (np.arange(TRIED) + 0.5) / TRIED
     tried = [Event(recording, float(time), shape) for shape in effect.trial_shapes for time in instants]
-    cosines = courses.cosines(recording, np.stack([_course(effect, event, courses) for event in tried]))
-    matrix = courses.information(recording, cosines, cosines)
-    score = cosines @ courses.score[recording]
+    cosines = [courses.cosines(r, np.stack([_course(effect, event, courses, r) for event in tried])) for r in within]
+    own = list(zip(within, cosines, strict=True))
+    matrix = sum((courses.information(r, part, part) for r, part in own), np.zeros(3))
+    score = sum((part @ courses.score[r] for r, part in own), np.zeros(3))
     earned: list[tuple[float, Event]] = []
     while len(earned) < effect.most_in_recording:
         gains = half_chi2(matrix, score)
@@ -132,7 +153,7 @@ def _events(courses: CourseGram, effect: Events, recording: int) -> list[tuple[f
         earned.append((float(gains[best]), tried[best]))
         if len(earned) == effect.most_in_recording:
             break
-        shared = courses.information(recording, cosines, cosines[best])
+        shared = sum((courses.information(r, part, part[best]) for r, part in own), np.zeros(3))
         kept = np.linalg.solve(matrix[best] + 1e-9 * np.trace(matrix[best]) * np.eye(3), np.eye(3))
         score = score - shared @ kept @ score[best]
         matrix = matrix - shared @ kept @ np.swapaxes(shared, 1, 2)
@@ -142,13 +163,13 @@ def _events(courses: CourseGram, effect: Events, recording: int) -> list[tuple[f
     return earned
 
 
-def _course(effect: Events, event: Event, courses: CourseGram) -> Floats:
+def _course(effect: Events, event: Event, courses: CourseGram, recording: int) -> Floats:
     """Return the torque of unit amplitude, or the error of a sensor, at the instants of the courses, (FINE,)."""
-    times = courses.times(event.recording)
+    times = courses.times(recording)
     after = times > event.time
     if isinstance(effect, BiasJump):
         return after.astype(float)
-    interval = float(courses.ends[event.recording]) / FINE
+    interval = float(courses.ends[recording]) / FINE
     blow = np.zeros(FINE)
     blow[min(int(event.time / interval), FINE - 1)] = 1.0 / interval
     if not isinstance(effect, ThermalSnap):

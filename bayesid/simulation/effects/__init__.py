@@ -35,7 +35,7 @@ from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelS
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.thruster_pulses import PulseTrain, ThrusterPulses
-from bayesid.simulation.effects.events import Event, Events
+from bayesid.simulation.effects.events import EVERY, Event, Events
 from bayesid.simulation.effects.kicks import Kicks
 from bayesid.simulation.effects.thermal_snap import ThermalSnap
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
@@ -47,6 +47,7 @@ from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wren
 # isort: on
 
 __all__ = [
+    "EVERY",
     "AccelBiasJump",
     "AccelPosition",
     "AerodynamicDrag",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import jax.numpy as jnp
 from jax import Array
 
 from bayesid.simulation.effects.effect import Situation
@@ -42,8 +41,7 @@ class BiasJump(Events):
     def read(self, values: Array, readings: Readings) -> Readings:
         """Return the readings with the jumps added."""
         key = self.sensor.value
-        after = readings.time[:, None] > jnp.asarray(self.times)
-        begun = jnp.where(after & (jnp.asarray(self.recordings) == readings.recording), 1.0, 0.0)
+        begun = self.begun(readings.time, readings.recording)
         return readings.replace(**{key: readings.channels[key] + begun @ self.each(values)})
 
 

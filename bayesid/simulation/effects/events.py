@@ -1,4 +1,4 @@
-"""Effects that are events: each in one recording, at an instant, with amplitudes of its own."""
+"""Effects that are events: each in one recording, or alike in all, at an instant, with amplitudes of its own."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from jax import Array
 from bayesid._io.errors import InputError
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.instant import Environment
 
-__all__ = ["Event", "Events"]
+__all__ = ["EVERY", "Event", "Events"]
+
+EVERY = -1
+"""Recording of an event that recurs in every recording, at the same instant and with the same amplitudes."""
+
+ALL = "all"
+"""How that is written."""
 
 
 class Event(NamedTuple):
@@ -24,7 +29,7 @@ class Event(NamedTuple):
     Attributes
     ----------
     recording : int
-        Number of the recording, from zero.
+        Number of the recording, from zero, or `EVERY`.
     time : float
         Instant in it [s].
     shape : tuple of float
@@ -42,8 +47,8 @@ class Events(Effect):
     Parameters
     ----------
     place : str
-        Events as ``RECORDING@TIME``, with recordings from 1, then the shape after slashes, and commas between events.
-        Without any there is one at 3 s in the first recording.
+        Events as ``RECORDING@TIME``, with recordings from 1, or ``all@TIME`` where it recurs in every recording, then
+        the shape after slashes, and commas between events. Without any there is one at 3 s in the first recording.
     """
 
     cause_kind = "event"
@@ -54,22 +59,25 @@ class Events(Effect):
     """Shapes that a diagnosis tries, equally probable beforehand."""
     most_in_recording: ClassVar[int] = 1
     """Most events that a diagnosis seeks in one recording."""
+    recurs: ClassVar[bool] = False
+    """Whether a diagnosis also seeks events that recur in every recording."""
 
     def __init__(self, place: str = "") -> None:
-        self.stated, self.only = bool(place), -1
+        self.stated, self.only = bool(place), EVERY
         self._take(tuple(map(self._parsed, place.split(","))) if place else (Event(0, 3.0, self.trial_shapes[0]),), ())
 
     def _parsed(self, text: str) -> Event:
         recording, _, rest = text.partition("@")
         try:
             time, *shape = map(float, rest.split("/"))
-            event = Event(int(recording) - 1, time, tuple(shape) or self.trial_shapes[0])
+            number = 0 if recording == ALL else int(recording)
+            known = (number > 0 or recording == ALL) and len(shape) in (0, len(self.trial_shapes[0]))
         except ValueError:
-            event = Event(-1, 0.0)
-        if event.recording < 0 or len(event.shape) != len(self.trial_shapes[0]):
-            problem = f"{self.name}: {text!r} is not an event"
-            raise InputError(problem, remedy=f"Write RECORDING@TIME, such as {self.name}:1@12.5,2@30")
-        return event
+            known = False
+        if not known:
+            remedy = f"Write RECORDING@TIME, such as {self.name}:1@12.5,2@30, or {self.name}:all@12.5"
+            raise InputError(f"{self.name}: {text!r} is not an event", remedy=remedy)
+        return Event(number - 1, time, tuple(shape) or self.trial_shapes[0])
 
     def _take(self, events: Sequence[Event], names: Sequence[str], one: bool = False) -> None:
         self.recordings = np.array([event.recording for event in events], dtype=float)
@@ -86,7 +94,7 @@ class Events(Effect):
         """Return what stands before the names of each event's amplitudes: its recording, and its number in that."""
         keys: list[str] = []
         for place, event in enumerate(events):
-            name = names[event.recording] if names else str(event.recording + 1)
+            name = ALL if event.recording == EVERY else names[event.recording] if names else str(event.recording + 1)
             earlier = sum(other.recording == event.recording for other in events[:place])
             keys.append(f"{name}.{earlier + 1}." if earlier else f"{name}.")
         return keys if len(events) > 1 or names else [""]
@@ -125,7 +133,7 @@ class Events(Effect):
         if not self.stated:
             return self.name
         texts = (
-            "/".join([f"{event.recording + 1}@{event.time:.6g}", *(f"{value:.5g}" for value in event.shape)])
+            "/".join([f"{event.recording + 1 or ALL}@{event.time:.6g}", *(f"{value:.5g}" for value in event.shape)])
             for event in self.events
         )
         return f"{self.name}:{','.join(texts)}"
@@ -143,14 +151,27 @@ class Events(Effect):
 
     def jumps(self, end: float) -> Sequence[float]:
         """Return the instants within a recording, of all events or of those of the one that was chosen."""
-        mine = [event for event in self.events if self.only in (-1, event.recording)]
+        mine = [event for event in self.events if event.recording == self.only or EVERY in (event.recording, self.only)]
         return tuple(event.time for event in mine if 0.0 <= event.time < end)
 
     def each(self, values: Array) -> Array:
         """Return the amplitudes of each event, shape (E, k), of values of the parameters."""
         return jnp.asarray(self.shares) @ values.reshape(-1, len(self.amplitude))
 
-    def begun(self, environment: Environment) -> Array:
-        """Return 1 for each event that has happened at an instant, else 0, shape (E,)."""
-        here = jnp.asarray(self.recordings) == environment.recording
-        return jnp.where(here & (environment.time > jnp.asarray(self.times)), 1.0, 0.0)
+    def begun(self, time: Array, recording: Array) -> Array:
+        """Return 1 for each event that has happened, else 0.
+
+        Parameters
+        ----------
+        time : (...) array
+            Instants in a recording [s].
+        recording : () array
+            Its number, from zero.
+
+        Returns
+        -------
+        (..., E) array
+        """
+        recordings = jnp.asarray(self.recordings)
+        here = (recordings == recording) | (recordings == EVERY)
+        return jnp.where(here & (jnp.asarray(time)[..., None] > jnp.asarray(self.times)), 1.0, 0.0)

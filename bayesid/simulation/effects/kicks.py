@@ -51,6 +51,7 @@ class Kicks(Events):
     # with J and P the angular momentum about the base origin and the momentum of each kick, the angular momentum about
     # the common centre of mass is x = sum (J - c x P) + u, with u' = -w x x + sum c' x P in base axes
     most_in_recording = 3
+    recurs = True  # a contact at the same posture of a repeated motion, or a latch that snaps
 
     def __init__(self, place: str = "", *, momentum: bool = True) -> None:
         linear = [(f"momentum.{axis}", "N s", 1.0) for axis in "xyz"] if momentum else []
@@ -74,7 +75,8 @@ class Kicks(Events):
 
     def _received(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum received so far, and the angular momentum about the common centre of mass."""
-        total = self.begun(instant.environment) @ self.each(values)
+        environment = instant.environment
+        total = self.begun(environment.time, environment.recording) @ self.each(values)
         linear = total[:3] if len(self.amplitude) > 3 else jnp.zeros(3)
         return linear, total[-3:] - jnp.cross(instant.body.com, linear) + inner
 

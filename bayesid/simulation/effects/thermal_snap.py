@@ -45,6 +45,7 @@ class ThermalSnap(Events):
     )
     amplitude = tuple((f"angular_momentum.{axis}", "N m s", 0.1) for axis in "xyz")
     trial_shapes = tuple((decay, kept) for kept in (0.0, 1.0) for decay in (2.0, 4.0, 8.0, 16.0))
+    recurs = True  # recordings that begin at the same point of the orbit cross the edge of the shadow at one time
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return what gives the base the largest rate of a snap."""
@@ -57,8 +58,9 @@ class ThermalSnap(Events):
         environment = instant.environment
         decay, kept = jnp.asarray(self.shapes).T
         since = jnp.maximum(environment.time - jnp.asarray(self.times), 0.0)
-        left = self.begun(environment) * jnp.exp(-since / decay)
-        share = jnp.where(kept > 0.5, self.begun(environment) - left, left)
+        begun = self.begun(environment.time, environment.recording)
+        left = begun * jnp.exp(-since / decay)
+        share = jnp.where(kept > 0.5, begun - left, left)
         slope = jnp.where(kept > 0.5, left, -left) / decay
         amplitudes = self.each(values)
         return share @ amplitudes, slope @ amplitudes
