@@ -19,12 +19,14 @@ from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import with_bodies_held
-from bayesid.diagnosis.settings import FULL
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import rows_of
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Fitted", "Linearisation", "Remaining", "SignatureBank", "SignatureProducts", "Signatures"]
+
+LARGE = 2e8
+"""Memory of columns that are computed anew where they are wanted again [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,11 @@ class SignatureBank:
             found = new | found
             causes += bank.causes
         return SignatureBank(tuple(item for items in found.values() for item in items), tuple(causes))
+
+    @property
+    def memory(self) -> int:
+        """Memory of the columns [bytes]."""
+        return sum(one.columns.nbytes for one in self.signatures)
 
     def without_columns(self) -> SignatureBank:
         """Return the bank with the names, tones and instants of its signatures alone."""
@@ -302,10 +309,10 @@ class Linearisation:
     def without_products(self) -> Linearisation:
         """Return the linearisation without the products, which take as much memory as the Gram.
 
-        With many recordings the columns go as well, unless other fits are to be made about the motion here.
+        Columns that take much memory go as well, unless other fits are to be made about the motion here.
         """
-        many = len(self.fit.posterior.manoeuvres) > FULL and not self.far
-        return replace(self, products=None, bank=self.bank.without_columns() if many else self.bank)
+        large = self.bank.memory > LARGE and not self.far
+        return replace(self, products=None, bank=self.bank.without_columns() if large else self.bank)
 
     def with_bodies_fixed(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies fixed there."""

@@ -105,7 +105,7 @@ def disturbing_wrench(
     ----------
     hypothesis : Hypothesis
     bank : SignatureBank
-        Bank under the hypothesis' noise, with the responses to cosines of torque and force.
+        Bank under the hypothesis' noise, with the responses to cosines of torque and force, or without any columns.
     name_frame : bool
         Whether the disturbance itself is the answer: its events and the axes that it is fixed in are looked for.
     settings : DiagnosisSettings, optional
@@ -114,7 +114,7 @@ def disturbing_wrench(
     fit = hypothesis.fit
     recordings = _reconstructed(fit)
     count = len(recordings)
-    if count < len(fit.posterior.manoeuvres):
+    if count < len(fit.posterior.manoeuvres) or not bank.memory:
         bank = smooth_signatures(hypothesis.perturbed, fit, recordings)
     rows = np.concatenate([np.arange(len(fit.residual))[rows_of(fit.posterior, r)] for r in recordings])
     times = np.asarray(fit.operating.node.environment.time)[recordings]
