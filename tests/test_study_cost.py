@@ -34,7 +34,7 @@ def made_up(nested: Nested | None) -> Cost:
             "identify": [Run(40.0, 60.0, 1.0, {}), Run(19.0, 25.0, 1.0, {}), Run(21.0, 25.0, 1.0, {})],
             "design": [Run(200.0, 300.0, 1.0, {}), Run(150.0, 250.0, 1.6, {})],
         },
-        many={
+        large={
             "check, 40 recordings": [Run(30.0, 30.0, 0.6, {}), Run(9.0, 9.0, 0.5, {})],
             "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=2.4)],
         },
@@ -52,7 +52,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     verdicts = {goal.text.partition(":")[0] + f" {goal.reached[:3]}": goal.verdict for goal in goals}
     by_text = [goal.verdict for goal in goals]
     # warm 5 s (payload takes 8.8 s) and 10 s, cold 20 s (20.8 s) and 40 s, memory, samples, identify, design,
-    # many recordings, start of a search
+    # much data, start of a search
     assert by_text == [
         Verdict.FAIL,
         Verdict.PASS,
@@ -66,7 +66,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     ], verdicts
     assert goals[2].text.endswith("at most 40 s for wheel and bias, growing torque, swinging torque")
     assert goals[-2].reached == "9 s, 0.5 GB; 35 s, 2.4 GB"
-    within = replace(cost, many={**cost.many, "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=1.9)]})
+    within = replace(cost, large={**cost.large, "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=1.9)]})
     assert goals_of(within)[-2].verdict is Verdict.PASS
     assert {goal.severity for goal in goals} == {Severity.LOW}
     STUDY.write(cost, tmp_path / "cost.pdf")

@@ -17,7 +17,7 @@ from studies.benchmark.run import EVALUATED
 from studies.common.provenance import MODELS, processor
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Severity, Study, Verdict
-from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, MANY, Cost, Nested, Run, middle, run
+from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, LARGE, Cost, Nested, Run, middle, run
 from studies.cost.search_times import SearchTimes
 
 MEMORY = 1.5  # largest wanted memory of a diagnosis [GB]
@@ -55,7 +55,7 @@ def goals_of(cost: Cost) -> list[Goal]:
             text = f"{name}, files to report, with cached compiled code: at most {limit:g} s"
             verdict = Verdict.between(min(walls), max(walls), most=limit)
             goals.append(Goal(text, _spread(walls), verdict, Severity.LOW))
-    return [goal for goal in (*goals, _many_goal(cost.many), _search_goal(cost.search)) if goal is not None]
+    return [goal for goal in (*goals, _large_goal(cost.large), _search_goal(cost.search)) if goal is not None]
 
 
 def _times(cost: Cost, code: str, limits: Collection[float]) -> Goal | None:
@@ -76,19 +76,23 @@ def _times(cost: Cost, code: str, limits: Collection[float]) -> Goal | None:
     return Goal(text, ", ".join(told), Verdict.all_of(verdicts), Severity.LOW)
 
 
-def _many_goal(many: Mapping[str, list[Run]]) -> Goal | None:
-    """Return the goal of what was run on many recordings; None where nothing was."""
+def _large_goal(large: Mapping[str, list[Run]]) -> Goal | None:
+    """Return the goal of what was run on much data; None where nothing was."""
     texts, told, verdicts = [], [], []
-    for row in MANY:
-        if row.title in many:
-            warm = many[row.title][-1]
-            seconds = warm.to_verdict if row.command == "diagnose" else warm.wall
+    for row in LARGE:
+        if row.title in large:
             texts.append(f"{row.title}: {row.seconds:g} s and {row.memory:g} GB")
+            if not large[row.title]:
+                told.append("refused for its memory")
+                verdicts.append(Verdict.FAIL)
+                continue
+            warm = large[row.title][-1]
+            seconds = warm.to_verdict if row.command == "diagnose" else warm.wall
             told.append(f"{seconds:.0f} s, {format_number(warm.memory, 2)} GB")
             verdicts.append(Verdict.of(seconds <= row.seconds and warm.memory <= row.memory))
     if not texts:
         return None
-    text = f"Many recordings, with cached compiled code, at most: {'; '.join(texts)}"
+    text = f"Much data, with cached compiled code, at most: {'; '.join(texts)}"
     return Goal(text, "; ".join(told), Verdict.all_of(verdicts), Severity.LOW)
 
 
@@ -165,7 +169,7 @@ def _runs(cost: Cost) -> CsvTable:
     rows = [
         [kind, name, number, "cold" if number == 0 else "warm", run.wall, run.processor, run.memory]
         + [run.phases.get(phase, "") for phase in names]
-        for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands), ("many", cost.many))
+        for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands), ("large", cost.large))
         for name, runs in group.items()
         for number, run in enumerate(runs)
     ]

@@ -25,11 +25,13 @@ from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.inference import choose_parameterisation, compiled, maximise
 from studies.benchmark.run import best_of, chain, posterior_of, seconds_per_evaluation
 from studies.common.ets7 import ets7
+from studies.common.provenance import MODELS
 from studies.cost.search_times import SearchTimes, search_times
 from studies.peers.density import Target
 from studies.peers.samplers import Budget, dynesty
 from studies.truth import hidden_causes
 
+FAST = 1000.0  # rate of fast inertial sensors [Hz]
 FIRST_SEED = 7100  # seed of the first case; those of tests and of the campaign are others
 
 
@@ -55,26 +57,41 @@ DIAGNOSES = (
 )
 
 
-class Many(NamedTuple):
-    """A diagnosis, or a check, of many recordings that is timed."""
+class Flown(NamedTuple):
+    """Recordings with a hidden wheel, alike but for their motion."""
+
+    number: int
+    duration: float  # of each [s]
+    fast: bool = False  # inertial sensors at 1 kHz and six encoders at 500 Hz, rather than all of three joints at 2 Hz
+
+    def __str__(self) -> str:
+        """Return their number, and how long they are where they are logs of fast sensors."""
+        return f"{self.number} recordings" + (f" of {self.duration:g} s at 1 kHz" if self.fast else "")
+
+
+class Large(NamedTuple):
+    """A diagnosis, or a check, of much data that is timed."""
 
     command: str
-    recordings: int  # of 160 s at 2 Hz
+    data: Flown
     # longest wanted time to the verdict, or of the check, with compiled code kept [s], and largest wanted memory [GB]
     seconds: float
     memory: float
 
     @property
     def title(self) -> str:
-        """Command and number of recordings."""
-        return f"{self.command}, {self.recordings} recordings"
+        """Command and recordings."""
+        return f"{self.command}, {self.data}"
 
 
-MANY = (
-    Many("check", 40, 15.0, 2.0),
-    Many("diagnose", 40, 45.0, 2.0),
-    Many("check", 200, 60.0, 2.0),
-    Many("diagnose", 200, 240.0, 2.0),
+LOGS, FORTY, HUNDREDS = Flown(3, 600.0, fast=True), Flown(40, 160.0), Flown(200, 160.0)
+LARGE = (
+    Large("check", LOGS, 20.0, 2.0),
+    Large("diagnose", LOGS, 60.0, 2.0),
+    Large("check", FORTY, 15.0, 2.0),
+    Large("diagnose", FORTY, 45.0, 2.0),
+    Large("check", HUNDREDS, 60.0, 2.0),
+    Large("diagnose", HUNDREDS, 240.0, 2.0),
 )
 
 # other commands, and the longest wanted time with compiled code kept, from files to report [s]
@@ -87,13 +104,18 @@ def write_case(name: str, folder: Path) -> Path:
     return hidden_causes.CASES[number].make(folder, FIRST_SEED + number)
 
 
-def write_many(recordings: int, folder: Path) -> Path:
-    """Write the files of many recordings of 160 s at 2 Hz with a hidden wheel, and return the study's."""
+def write_large(data: Flown, folder: Path) -> Path:
+    """Write the files of recordings with a hidden wheel, noise per root hertz alike, and return the study's."""
     case = next(case for case in hidden_causes.CASES if case.name == "wheel-momentum")
-    flown = {"count": recordings, "duration": 160.0}
-    latitudes = np.random.default_rng(FIRST_SEED).uniform(0.0, 2.0 * np.pi, recordings).tolist()
-    fixed = {**case.fixed, "manoeuvres": flown, "latitudes": latitudes}
-    return replace(case, fixed=fixed).make(folder, FIRST_SEED + 100)
+    latitudes = np.random.default_rng(FIRST_SEED).uniform(0.0, 2.0 * np.pi, data.number).tolist()
+    fixed = {"manoeuvres": {"count": data.number, "duration": data.duration}, "latitudes": latitudes}
+    if data.fast:
+        noise = float(np.sqrt(0.5 * FAST))  # that of 2 Hz per root hertz
+        sigmas = {"rate_sigma": 1e-5 * noise, "accel_sigma": 1e-5 * noise, "encoder_sigma": 1e-6 * noise * 0.5**0.5}
+        periods = {"rate_period": 1.0 / FAST, "accel_period": 1.0 / FAST, "encoder_period": 2.0 / FAST}
+        case = replace(case, urdf=MODELS / "ets7.urdf")
+        fixed |= {"sensors": {**sigmas, **periods}, "flown": 0.1}
+    return replace(case, fixed={**case.fixed, **fixed}).make(folder, FIRST_SEED + 100)
 
 
 PROGRAM = "from bayesid.app.command_line import main; main()"
@@ -296,7 +318,8 @@ class Cost:
     sampled: dict[str, Run]  # diagnoses with 4,000 effective samples of the extended model, compiled code kept
     # other commands on the recordings with nothing hidden, the first run of each without compiled code
     commands: dict[str, list[Run]]
-    many: dict[str, list[Run]]  # checks and diagnoses of many recordings, the first run of each without compiled code
+    large: dict[str, list[Run]]  # checks and diagnoses of much data, the first run of each without compiled code; none
+    # of one that was refused for the memory that it needs
     candidates: dict[int, float]  # time of a verdict by the number of candidates [s]
     growth: dict[str, dict[int, float]]  # time of one evaluation by what grows [s]
     floor: Floor
@@ -312,7 +335,7 @@ def run(
     seed: int = 0,
     titles: tuple[str, ...] = TITLES,
     commands: tuple[str, ...] = tuple(COMMANDS),
-    many: tuple[Many, ...] = MANY,
+    large: tuple[Large, ...] = LARGE,
     before: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Cost:
@@ -323,7 +346,7 @@ def run(
     full : bool; whether to repeat, to sample, and to run the nested sampler up to ten minutes rather than ten seconds
     seed : int; seed of the nested sampler
     titles, commands : tuple of str; diagnoses and other commands to time
-    many : tuple of Many; runs on many recordings, which only a full study makes
+    large : tuple of Large; runs on much data, which only a full study makes
     before : Path, optional; times that an earlier run wrote, to compare with
     progress : callable, optional; receives a line before each part
     """
@@ -352,12 +375,16 @@ def run(
             name: timed(name, (name,), files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
         }
-        on_many = {}
-        for row in many if full else ():
-            file = place / f"many-{row.recordings}" / "study.toml"
-            file = file if file.is_file() else write_many(row.recordings, file.parent)
+        on_large = {}
+        for row in large if full else ():
+            file = place / str(row.data) / "study.toml"
+            file = file if file.is_file() else write_large(row.data, file.parent)
             asked = ("diagnose", "--no-sample", "--no-fly-next") if row.command == "diagnose" else (row.command,)
-            on_many[row.title] = timed(row.title, asked, file, 2, place / "cache-many")
+            try:
+                on_large[row.title] = timed(row.title, asked, file, 2, place / "cache-large")
+            except RuntimeError as refusal:
+                progress(str(refusal))
+                on_large[row.title] = []
         progress("search for manoeuvres")
         search = search_times(place / "cache-search") if full else None
         progress("candidates and nested sampling")
@@ -370,7 +397,7 @@ def run(
     progress("growth of one evaluation")
     grown = growth(20) if full else growth(2, sizes=1)
     floor = floor_of(20 if full else 2)
-    return Cost(diagnoses, sampled, others, on_many, by_candidates, grown, floor, one, search, full, before)
+    return Cost(diagnoses, sampled, others, on_large, by_candidates, grown, floor, one, search, full, before)
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:
