@@ -8,9 +8,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
-from bayesid.diagnosis import Status, diagnose
+from bayesid.diagnosis import Diagnosis, Status, diagnose
 from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
+from bayesid.recording.blocks import BLOCKS_PER_SECOND
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
@@ -54,8 +55,10 @@ class Fitted(NamedTuple):
     rate_sd: np.ndarray
 
 
-def study_at(readings: dict[str, np.ndarray], rate: float) -> tuple[Model, list[Manoeuvre]]:
-    """Return the model and the recording at a rate."""
+def study_at(
+    readings: dict[str, np.ndarray], rate: float, blocks: float = BLOCKS_PER_SECOND
+) -> tuple[Model, list[Manoeuvre]]:
+    """Return the model and the recording at a rate, reduced to so many blocks a second."""
     rng, fine, noise = np.random.default_rng(3), np.arange(0.0, END, 1.0 / FINE), float(np.sqrt(rate / 2.0))
     count = round(FINE / rate)
     time, channels = fine.reshape(-1, count).mean(axis=1), {}
@@ -68,13 +71,12 @@ def study_at(readings: dict[str, np.ndarray], rate: float) -> tuple[Model, list[
     white = White(DENSITY * noise)
     sensors = (Sensor(SensorKind.RATE, white), Sensor(SensorKind.ACCEL, white, position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
-    moved = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODERS * noise})
-    return Model(robot, sensors, (prior,)), [Manoeuvre(recording, moved)]
+    moved = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODERS * noise}, blocks_per_second=blocks)
+    return Model(robot, sensors, (prior,)), [Manoeuvre(recording, moved, blocks_per_second=blocks)]
 
 
-def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
-    """Return what is learnt at a rate, by Laplace's approximation."""
-    model, manoeuvres = study_at(readings, rate)
+def fitted(model: Model, manoeuvres: list[Manoeuvre]) -> Fitted:
+    """Return what is learnt, by Laplace's approximation."""
     posterior = Posterior.of(model, manoeuvres)
     start = posterior.starting_point()
     mode = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, 1e-9, 200).x
@@ -87,13 +89,21 @@ def posterior_at(readings: dict[str, np.ndarray], rate: float) -> Fitted:
 
 def test_bodies_are_as_well_known_at_any_rate():
     readings = flown()
-    slow, fast = (posterior_at(readings, rate) for rate in (10.0, FINE))
+    slow, fast = (fitted(*study_at(readings, rate)) for rate in (10.0, FINE))
     assert (np.abs(fast.mode - slow.mode) / slow.sd)[BODIES].max() < 0.1
     np.testing.assert_allclose(fast.sd[BODIES], slow.sd[BODIES], rtol=0.005)
     # the rate at time 0 is no better known than the joints' speeds there, which fits take for true
     assert (np.abs(fast.rate - slow.rate) / slow.rate_sd).max() < 0.1
-    for fitted in (slow, fast):
-        assert (np.abs(fitted.rate - FIRST_RATE) / fitted.rate_sd).max() < 4.0
+    for learnt in (slow, fast):
+        assert (np.abs(learnt.rate - FIRST_RATE) / learnt.rate_sd).max() < 4.0
+
+
+def test_blocks_know_what_all_samples_know():
+    """Means over 0.1 s beside the likelihood of all 40 samples a second."""
+    readings = flown()
+    reduced, whole = (fitted(*study_at(readings, 40.0, blocks)) for blocks in (BLOCKS_PER_SECOND, 0.0))
+    assert (np.abs(reduced.mode - whole.mode) / whole.sd)[BODIES].max() < 0.1
+    np.testing.assert_allclose(reduced.sd[BODIES], whole.sd[BODIES], rtol=0.01)
 
 
 LATE = 0.005  # delay of the gyro [s]
@@ -101,28 +111,51 @@ WHEEL = mj.Rotor((0.0, 0.006, 0.003), (0.1, 0.0, 0.0))
 PANEL = mj.panel(0.5, (1.0, 0.4), (0.0, 0.5, 0.1), (1.0, 0.0, 0.2), 0.9)
 
 
+def late_by(readings: dict[str, np.ndarray], delay: float) -> dict[str, np.ndarray]:
+    """Return the readings with a gyro that shows the past [s]."""
+    shift = np.maximum(np.arange(round(END * FINE)) - round(delay * FINE), 0)
+    return {name: values[shift] if name.startswith("rate") else values for name, values in readings.items()}
+
+
+def toned(readings: dict[str, np.ndarray], frequency: float) -> dict[str, np.ndarray]:
+    """Return the readings with a vibration of the gyro's mount about x, ten times its noise at 10 Hz."""
+    tone = 10.0 * DENSITY * np.sqrt(5.0) * np.sin(2.0 * np.pi * frequency * np.arange(round(END * FINE)) / FINE)
+    return {**readings, "rate.x": readings["rate.x"] + tone}
+
+
+def assert_same(one: Diagnosis, other: Diagnosis) -> None:
+    assert (one.verdict.status, one.verdict.causes) == (other.verdict.status, other.verdict.causes)
+    for name, probability in one.probabilities.inclusion.items():
+        assert other.probabilities.inclusion[name] == pytest.approx(probability, abs=0.02), name
+
+
 @pytest.mark.parametrize(
-    ("hidden", "late"),
+    ("hidden", "late", "tone"),
     [
-        ({}, 0.0),
-        ({"rotor": WHEEL}, 0.0),
-        ({}, LATE),
-        ({"appendages": [PANEL]}, 0.0),
-        ({"flexible": [mj.Flexibility("joint2", 2.0)]}, 0.0),
+        ({}, 0.0, 0.0),
+        ({}, 0.0, 40.0),
+        ({"rotor": WHEEL}, 0.0, 0.0),
+        ({"rotor": WHEEL}, 0.0, 40.0),
+        ({}, LATE, 0.0),
+        ({"appendages": [PANEL]}, 0.0, 0.0),
+        ({"flexible": [mj.Flexibility("joint2", 2.0)]}, 0.0, 0.0),
     ],
-    ids=["nothing", "wheel", "late gyro", "panel at 0.9 Hz", "flexible joint"],
+    ids=["nothing", "tone", "wheel", "wheel and tone", "late gyro", "panel at 0.9 Hz", "flexible joint"],
 )
-def test_a_verdict_is_the_same_at_any_rate(hidden, late):
-    readings = flown(**hidden)
-    for axis in "xyz":
-        rate = readings[f"rate.{axis}"]
-        readings[f"rate.{axis}"] = rate[np.maximum(np.arange(len(rate)) - round(late * FINE), 0)]
-    slow, *others = (diagnose(*study, 1) for study in (study_at(readings, rate) for rate in (10.0, 100.0, FINE)))
+def test_a_verdict_is_the_same_at_any_rate(hidden, late, tone):
+    readings = toned(late_by(flown(**hidden), late), tone)
+    slow, *others = (diagnose(*study_at(readings, rate), 1) for rate in (10.0, 100.0, FINE))
     assert bool(slow.verdict.causes) == bool(hidden or late)
     for fast in others:
-        assert (fast.verdict.status, fast.verdict.causes) == (slow.verdict.status, slow.verdict.causes)
-        for name, probability in slow.probabilities.inclusion.items():
-            assert fast.probabilities.inclusion[name] == pytest.approx(probability, abs=0.02), name
+        assert_same(slow, fast)
+
+
+@pytest.mark.parametrize("hidden", [{"rotor": WHEEL}, {"appendages": [PANEL]}], ids=["wheel", "panel at 0.9 Hz"])
+def test_a_verdict_on_blocks_is_that_on_all_samples(hidden):
+    readings = flown(**hidden)
+    whole, reduced = (diagnose(*study_at(readings, 40.0, blocks), 1) for blocks in (0.0, BLOCKS_PER_SECOND))
+    assert whole.verdict.causes
+    assert_same(whole, reduced)
 
 
 FAST_RATE = 60.0
