@@ -1,8 +1,8 @@
 """Kind of the causes that are events, such as kicks, snaps of a panel and jumps of a sensor's bias.
 
 Separate events have amplitudes of their own, which a cause with few amplitudes in all recordings, such as a leak, need
-not pay for. Events that may recur (`Events.recurs`) are therefore sought in a second way: at one instant of every
-recording, with the same amplitudes.
+not pay for. In repeated flights events recur: a contact at the same posture, a snap at the edge of the shadow, a change
+of range. They are therefore sought in a second way: at one instant of every recording, with the same amplitudes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ EARNED = 4.0
 """Nats that a further event must earn beyond the number of places where it could be."""
 
 WAYS = 2
-"""Ways in which events come that may recur, equally probable: each by itself, or alike in every recording."""
+"""Ways in which events come, equally probable: each by itself, or alike in every recording."""
 
 
 class EventCause(ShapedCause):
@@ -71,7 +71,7 @@ class EventCause(ShapedCause):
             return []
         recordings = range(len(courses.ends))
         apart = [event for recording in recordings for event in _events(courses, events, recording)]
-        if not events.recurs or len(recordings) == 1:
+        if len(recordings) == 1:
             return _proposals(events, apart, float(courses.ends.sum()), len(recordings), 0.0)
         alike = _events(courses, events, EVERY)
         return [

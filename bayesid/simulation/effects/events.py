@@ -59,8 +59,6 @@ class Events(Effect):
     """Shapes that a diagnosis tries, equally probable beforehand."""
     most_in_recording: ClassVar[int] = 1
     """Most events that a diagnosis seeks in one recording."""
-    recurs: ClassVar[bool] = False
-    """Whether a diagnosis also seeks events that recur in every recording."""
 
     def __init__(self, place: str = "") -> None:
         self.stated, self.only = bool(place), EVERY

@@ -51,7 +51,6 @@ class Kicks(Events):
     # with J and P the angular momentum about the base origin and the momentum of each kick, the angular momentum about
     # the common centre of mass is x = sum (J - c x P) + u, with u' = -w x x + sum c' x P in base axes
     most_in_recording = 3
-    recurs = True  # a contact at the same posture of a repeated motion, or a latch that snaps
 
     def __init__(self, place: str = "", *, momentum: bool = True) -> None:
         linear = [(f"momentum.{axis}", "N s", 1.0) for axis in "xyz"] if momentum else []

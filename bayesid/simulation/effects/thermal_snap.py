@@ -45,7 +45,6 @@ class ThermalSnap(Events):
     )
     amplitude = tuple((f"angular_momentum.{axis}", "N m s", 0.1) for axis in "xyz")
     trial_shapes = tuple((decay, kept) for kept in (0.0, 1.0) for decay in (2.0, 4.0, 8.0, 16.0))
-    recurs = True  # recordings that begin at the same point of the orbit cross the edge of the shadow at one time
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return what gives the base the largest rate of a snap."""
