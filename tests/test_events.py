@@ -260,7 +260,12 @@ def independent(draw, strength):
 @pytest.mark.slow
 @pytest.mark.parametrize("kick", [recurring, independent])
 def test_kicks_beside_a_mass_that_shifts_are_no_leak(kick, tmp_path):
-    """A leak has three amplitudes, and stands for a kick where the base of each recording may have jumped besides."""
+    """A leak has three amplitudes, and stands for a kick where the base of each recording may have jumped besides.
+
+    A weak kick and a jump of the gyro's bias differ in little but their sizes: both may be reported.
+    """
     case = hidden_case("kicks, mass-shift", kick, hide.jumping_mass)
     verdict = diagnosed(case.make(tmp_path, 2, 0.5)).verdict
-    assert set(verdict.causes) == {"kicks", "mass-shift"}
+    reported = [set(names) for names in (verdict.causes, *verdict.ambiguous_with)]
+    assert {"kicks", "mass-shift"} in reported
+    assert not any("thruster-leak" in names for names in reported)
