@@ -105,6 +105,7 @@ def test_the_rigid_robot_is_that_of_mujoco():
     assert np.abs(error[:, 3:]).max() < 1e-5 * np.abs(exact[:, 3:]).max()
 
 
+@pytest.mark.slow
 def test_an_encoder_offset_displaces_the_unknown_load():
     shown = Recorded(offset=(0.0, 0.02, 0.0))
     assert share(truth(), simulated(shown), simulated(shown, EncoderOffset("joint2"), (0.02,))) < 1e-4

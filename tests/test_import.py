@@ -57,7 +57,8 @@ def computed_where(precision: str, code: str) -> list:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@pytest.mark.parametrize("code", [DENSITY, pytest.param(IDENTIFIED, marks=pytest.mark.slow)], ids=["density", "all"])
+@pytest.mark.slow
+@pytest.mark.parametrize("code", [DENSITY, IDENTIFIED], ids=["density", "all"])
 def test_code_of_jax_beside_it_stays_in_its_precision_and_the_results_are_those_of_64_bits(code: str):
     before, after, ours = computed_where("0", code)
     assert before == ["float32"] * 2

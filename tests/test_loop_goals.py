@@ -203,6 +203,7 @@ def test_a_loop_that_asks_for_a_cause_goes_on_until_it_is_decided(tmp_path: Path
         loop_of(goals=goals)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("planned")
 def test_a_lost_review_is_made_again_and_a_changed_goal_is_assessed(tmp_path: Path):
     first = loop_of(FINE, FINE, FINE).run(Still(), tmp_path)
@@ -219,6 +220,7 @@ def test_a_lost_review_is_made_again_and_a_changed_goal_is_assessed(tmp_path: Pa
         loop_of(FINE, WRONG, FINE).run(Still(), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("planned")
 def test_the_report_has_all_steps(tmp_path: Path):
     history = loop_of(FINE, WRONG).run(Still(), tmp_path)

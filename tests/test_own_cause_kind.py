@@ -56,6 +56,7 @@ def found(planar_case):
         yield instant, diagnose(model, [replace(manoeuvre, recording=recording)], 0, effects=effects)
 
 
+@pytest.mark.slow
 def test_it_is_found_and_named_with_its_size_and_its_instant(found):
     instant, result = found
     assert result.verdict.causes == ("step-torque",)

@@ -122,6 +122,7 @@ def agree(result: bayesid.Identification, deviations: float = 4.0) -> None:
     np.testing.assert_array_less(np.abs(draws.std(axis=0) / evidence.sd - 1.0), deviations * error / evidence.sd)
 
 
+@pytest.mark.slow
 def test_a_users_own_sampler_takes_the_place_of_emcee(planar_case):
     result = bayesid.identify(planar_case.posterior, 3, effective_samples=1000.0, sampler=Importance())
     agree(result)

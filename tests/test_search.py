@@ -107,6 +107,7 @@ def test_a_descent_may_be_sent_to_another_process(planar: Problem) -> None:
     assert again.shared is task.shared  # it is compiled once
 
 
+@pytest.mark.slow
 def test_an_exchange_takes_whole_courses_of_few_joints(planar: Problem) -> None:
     rng = np.random.default_rng(11)
     motions = [random_start(planar, rng) for _ in range(2)]

@@ -88,6 +88,7 @@ def test_an_error_of_a_sensor_is_told_from_friction(flown):
     assert cause.mean[0] == pytest.approx(OFFSET, abs=3.0 * cause.sd[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5, 8))
 def test_torques_that_lack_nothing_raise_no_alarm(flown, seed):
     found = read(flown(seed))
