@@ -19,7 +19,15 @@ from bayesid import (
 )
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.response.present_fit import fit_present_model, follow, step_along_data, strayed, without_torque
+from bayesid.diagnosis.response.present_fit import (
+    FollowingTorque,
+    fit_present_model,
+    follow,
+    improbable,
+    step_along_data,
+    strayed,
+    without_torque,
+)
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
 from studies.truth import mujoco as mj
@@ -126,3 +134,20 @@ def test_a_large_unrecorded_wheel_is_named(spun):
     assert found.verdict.status is Status.EXPLAINED
     assert found.verdict.causes == ("wheel-history:z",)
     assert found.gain.after.chi2_per_sample < 1.2
+
+
+@pytest.mark.slow
+def test_a_large_unrecorded_wheel_is_named_beside_a_small_unexplained_torque(spun):
+    """A body of a fraction of its inertia let the torque of the present model do what the wheel does."""
+    model, manoeuvres = spun
+    model = model.extend(FollowingTorque(END, 1e-3))
+    posterior = Posterior.of(model, manoeuvres, step=0.1)
+    present = fit_present_model(PerturbedModel(posterior))
+    assert not present.held
+    assert improbable(present.fit)
+    assert present.fit.chi2 < 2.0 * posterior.samples
+    effects = [create("wheel-history:z", end=END), create("rate-scale")]
+    found = diagnose(model, manoeuvres, 1, effects=[effect.attach(model.robot) for effect in effects])
+    assert found.bodies_fixed
+    assert found.verdict.causes == ("wheel-history:z",)
+    assert found.cause_probability("wheel-history:z") > 0.999

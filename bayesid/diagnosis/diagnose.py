@@ -19,7 +19,13 @@ from bayesid.diagnosis.outcome.disturbance import disturbing_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead, torque_candidates, torques_beside
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.response.present_fit import fit_present_model, step_along_data, without_torque
+from bayesid.diagnosis.response.present_fit import (
+    PresentFit,
+    fit_present_model,
+    improbable,
+    step_along_data,
+    without_torque,
+)
 from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.run_size import RunSize
 from bayesid.diagnosis.search.fitted_set import Hypothesis
@@ -104,17 +110,18 @@ def diagnose(
     perturbed.compile()
     clock.ends("compile")
     progress(0.1, "fitting the present model")
-    first = fit_present_model(perturbed, settings=settings)
-    if first.held and (step := step_along_data(posterior)) < posterior.step:
-        posterior = Posterior.of(posterior.model, manoeuvres, step=step)
-        perturbed = PerturbedModel(posterior, perturbed.frozen)
-        first = fit_present_model(perturbed, settings=settings)
-    perturbed = perturbed.with_posterior(relinearised(posterior, first.fit.z))
-    present = fit_present_model(perturbed, first.fit.z, settings)
-    before = Hypothesis(perturbed, present.fit)
-    clock.ends("fit")
     considered = Catalogue(tuple(catalogue), limits, prior, settings)
-    search = search_models(perturbed, before.fit, considered, rng, progress, bodies_fixed=present.held)
+    start = perturbed
+    perturbed, present = _fitted(start, settings)
+    clock.ends("fit")
+    search = search_models(perturbed, present.fit, considered, rng, progress, bodies_fixed=present.held)
+    if not present.held and improbable(present.fit, settings) and not search.alarm.silent:
+        progress(0.6, "weighing the causes along the motion in the data")
+        near, held = _fitted(start, settings, hold=True)
+        along = search_models(near, held.fit, considered, rng, progress, bodies_fixed=True)
+        if along.highest > search.highest:
+            perturbed, present, search = near, held, along
+    before = Hypothesis(perturbed, present.fit)
     progress(0.65, "fitting the most probable causes")
     search, fitted = with_misfit(search, catalogue, settings)
     classes = search.classes()
@@ -156,6 +163,23 @@ def diagnose(
         seed,
         clock.seconds,
     )
+
+
+def _fitted(
+    perturbed: PerturbedModel, settings: DiagnosisSettings, *, hold: bool = False
+) -> tuple[PerturbedModel, PresentFit]:
+    """Return the fit of the present model, and the model with the encoders' errors linearised about it.
+
+    Where the bodies are held, the integration step suits the motion in the data.
+    """
+    posterior = perturbed.posterior
+    first = fit_present_model(perturbed, settings=settings, hold=hold)
+    if first.held and (step := step_along_data(posterior)) < posterior.step:
+        posterior = Posterior.of(posterior.model, posterior.manoeuvres, step=step)
+        perturbed = PerturbedModel(posterior, perturbed.frozen)
+        first = fit_present_model(perturbed, settings=settings, hold=hold)
+    perturbed = perturbed.with_posterior(relinearised(posterior, first.fit.z))
+    return perturbed, fit_present_model(perturbed, first.fit.z, settings, hold=hold)
 
 
 def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bool) -> list[Effect]:

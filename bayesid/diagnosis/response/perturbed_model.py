@@ -284,9 +284,11 @@ class PerturbedModel:
             parameters = np.concatenate([z[self.free], *chosen])
             hessian = here.jacobian.T @ here.jacobian + np.eye(len(parameters))
             gradient = here.jacobian.T @ here.residual + parameters
+            unit: Floats = 1.0 / np.sqrt(np.diag(hessian))  # brings unknowns of very different sensitivities to one
+            scaled = unit[:, None] * hessian * unit
             taken = False
             for _ in range(8):
-                step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
+                step = -unit * sla.solve(scaled + damping * np.eye(len(unit)), unit * gradient, assume_a="pos")
                 trial = parameters + step
                 new_z = z.copy()
                 new_z[self.free] = trial[: ends[0]]

@@ -6,6 +6,10 @@ as one that has not converged, since a load of many times its first guess needs 
 astray it is started again from where the bodies have their prior's centre; where it strays from there as well, they
 stay at that centre.
 
+A fit may also follow the data with unknowns that its prior all but excludes: a body of a thirtieth of its inertia lets
+a small torque do what a wheel does. About such a fit the causes are as good as invisible, so that they are weighed
+along the data as well (`diagnosis.diagnose`), and the evidence decides.
+
 The change by a cause is linear only about a motion that is nearly the true one. Where the present model does not come
 near it, a free torque in every recording, piecewise linear in time, brings the model to the motion that the sensors
 saw, its bodies held at their prior; there, a cause that takes the place of the torque changes the motion little,
@@ -37,6 +41,7 @@ __all__ = [
     "PresentFit",
     "fit_present_model",
     "follow",
+    "improbable",
     "step_along_data",
     "strayed",
     "with_bodies_held",
@@ -68,27 +73,55 @@ class PresentFit:
     held: bool
 
 
+def improbable(fit: Fit, settings: DiagnosisSettings = DEFAULT_SETTINGS) -> bool:
+    """Return whether the bodies of a fit, or all its other unknowns, are where their prior all but excludes them."""
+    bodies = fit.posterior.unknowns.layout.all_bodies
+    return any(
+        len(z) > 0 and chi2.sf(float(z @ z), len(z)) < settings.bodies_improbable
+        for z in (fit.z[bodies], np.delete(fit.z, bodies))
+    )
+
+
 def strayed(fit: Fit, settings: DiagnosisSettings = DEFAULT_SETTINGS) -> bool:
-    """Return whether a fit has driven its bodies to where their prior all but excludes them, and fits badly there."""
-    bodies = fit.z[fit.posterior.unknowns.layout.all_bodies]
+    """Return whether a fit has driven unknowns to where their prior all but excludes them, and fits badly there.
+
+    Bodies may be far from a poor guess where they follow the data. All other unknowns have physical sizes, so that
+    their distance from the prior counts as misfit: a small unexplained torque that follows a wheel does not explain it.
+    """
     if not np.isfinite(fit.cost):
         return True
-    far = len(bodies) > 0 and chi2.sf(float(bodies @ bodies), len(bodies)) < settings.bodies_improbable
-    return bool(far and fit.chi2 > settings.misfit * fit.posterior.samples)
+    others = np.delete(fit.z, fit.posterior.unknowns.layout.all_bodies)
+    misfit = fit.chi2 + float(others @ others)
+    return improbable(fit, settings) and misfit > settings.misfit * fit.posterior.samples
 
 
 def fit_present_model(
-    perturbed: PerturbedModel, z: Floats | None = None, settings: DiagnosisSettings = DEFAULT_SETTINGS
+    perturbed: PerturbedModel,
+    z: Floats | None = None,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
+    *,
+    hold: bool = False,
 ) -> PresentFit:
-    """Fit the present model, from the start or from a point (size,), and hold its bodies where every fit strays."""
-    first = perturbed.fit(z=z)
-    if strayed(first, settings) or not first.converged:
-        first = min(first, _followed(perturbed, perturbed.start() if z is None else z), key=lambda fit: fit.cost)
-    if not strayed(first, settings):
-        return PresentFit(first, held=False)
+    """Fit the present model and hold its bodies where every fit strays.
+
+    Parameters
+    ----------
+    perturbed : PerturbedModel
+    z : (size,) array, optional
+        Point from which the fit starts.
+    settings : DiagnosisSettings, optional
+    hold : bool
+        Whether to hold the bodies in any case.
+    """
+    if not hold:
+        first = perturbed.fit(z=z)
+        if strayed(first, settings) or not first.converged:
+            first = min(first, _followed(perturbed, perturbed.start() if z is None else z), key=lambda fit: fit.cost)
+        if not strayed(first, settings):
+            return PresentFit(first, held=False)
     held = _fit_beside_bodies(perturbed)
     again = perturbed.fit(z=held.z)
-    return PresentFit(held, held=True) if strayed(again, settings) else PresentFit(again, held=False)
+    return PresentFit(held, held=True) if hold or strayed(again, settings) else PresentFit(again, held=False)
 
 
 def bodies_frozen(perturbed: PerturbedModel) -> PerturbedModel:

@@ -47,6 +47,11 @@ class ModelSearch:
     probabilities: SetProbabilities
     settings: DiagnosisSettings = DEFAULT_SETTINGS
 
+    @property
+    def highest(self) -> float:
+        """Log evidence of the best explanation."""
+        return max(search.highest for search in self.searches)
+
     def under(self, causes: Sequence[str]) -> SetSearch:
         """Return the search under the faults of the noise that are among some causes."""
         faulty = {name for search in self.searches for name in search.noise.names} & set(causes)
