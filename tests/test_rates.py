@@ -209,3 +209,9 @@ def test_fast_telemetry_without_a_cause_is_adequate(tmp_path):
     assert (
         diagnosed(fast_case("null", status="adequate", flown=0.05).make(tmp_path, 1)).verdict.status is Status.ADEQUATE
     )
+
+
+def test_a_mass_that_moves_for_seconds_is_unknown_in_fast_telemetry(tmp_path):
+    """A part moves by 15 mm in two seconds, a dozen standard deviations in all: the verdict was adequate."""
+    moved = diagnosed(fast_case("shifting-mass", hide.shifting_mass, status="unknown", flown=0.05).make(tmp_path, 1))
+    assert moved.verdict.status is Status.UNKNOWN

@@ -316,33 +316,25 @@ def error_signatures(posterior: Posterior, name: str, channels: slice) -> Signat
 def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     """Return the bank of one burst per sensor, at the places where the residual is largest.
 
-    A burst may begin at every sample, and has errors of any sign in all samples and channels of its length. All places
-    are equally probable beforehand; only the strongest are evaluated, each with its share of the prior, so that the
-    evidence is a lower bound. The choice depends on the residual: these candidates are no part of the alarm.
+    A burst may begin at every sample and has errors of any sign in all steps and channels of its length. All places and
+    lengths are equally probable beforehand; only the strongest are evaluated, each with its share of the prior, so that
+    the evidence is a lower bound. The choice depends on the residual: these candidates are no part of the alarm.
     """
     posterior = perturbed.posterior
     view = ResidualView.of(posterior, fit.residual)
     banks = []
     for kind in posterior.model.channels.kinds:
         columns = posterior.model.channels.of(kind)
-        places: list[tuple[float, int, Integers]] = []
-        for r in range(view.recordings):
-            there = np.flatnonzero(view.mask[r, :, columns].any(axis=1))
-            if len(there) < LENGTH:  # a burst needs as many samples as it lasts
-                continue
-            energy = (view.values[r, there, columns] ** 2).sum(axis=1)
-            sums = np.convolve(energy, np.ones(LENGTH), "valid")
-            places += [(float(value), r, there[k : k + LENGTH]) for k, value in enumerate(sums)]
+        places = [place for r in range(view.recordings) for place in _places(view, r, columns)]
         if not places:
             continue
         name = f"burst of {kind.value}"
         chosen = _apart(sorted(places, key=lambda item: -item[0]))
         signatures = []
         for number, (_, r, rows) in enumerate(chosen):
-            mask = np.zeros((*posterior.residual_shape[1:], len(rows), columns.stop - columns.start))
-            for k, row in enumerate(rows):
-                for c in range(columns.start, columns.stop):
-                    mask[row, c, k, c - columns.start] = float(view.mask[r, row, c])
+            mask = np.zeros((*posterior.residual_shape[1:], LENGTH, columns.stop - columns.start))
+            for step, c in np.ndindex(mask.shape[2:]):
+                mask[rows[step], columns.start + c, step, c] = view.mask[r, rows[step], columns.start + c]
             signatures.append(Signatures(f"{name}, place {number + 1}", mask.reshape(len(mask) * mask.shape[1], -1), r))
         forms = [(AmplitudeGroup(item.name, LARGEST),) for item in signatures]
         shares = (1.0 / len(places),) * len(forms)
@@ -351,11 +343,34 @@ def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     return SignatureBank.joined(banks)
 
 
+def _places(view: ResidualView, recording: int, columns: slice) -> list[tuple[float, int, Integers]]:
+    """Return all bursts in a recording: the energy of their steps' means, the recording, and rows (`LENGTH`, samples).
+
+    The samples of a step are doubled until the burst is as long as a half wave of the fastest error.
+    """
+    there = np.flatnonzero(view.mask[recording, :, columns].any(axis=1))
+    values, known = (part[recording, there, columns].astype(float) for part in (view.values, view.mask))
+    sums, counts = (np.cumsum(np.concatenate([part[:1] * 0.0, part]), axis=0) for part in (values, known))
+    places: list[tuple[float, int, Integers]] = []
+    samples = 1
+    while LENGTH * samples <= (len(there) if samples == 1 else len(there) // ERROR_WAVES):
+        step, count = (each[samples:] - each[:-samples] for each in (sums, counts))
+        energy = (step**2 / np.maximum(count, 1.0)).sum(axis=1)
+        starts = len(there) - LENGTH * samples + 1
+        whole = sum(energy[k * samples : k * samples + starts] for k in range(LENGTH))
+        places += [
+            (float(value), recording, there[start : start + LENGTH * samples].reshape(LENGTH, samples))
+            for start, value in enumerate(np.atleast_1d(whole))
+        ]
+        samples *= 2
+    return places
+
+
 def _apart(places: list[tuple[float, int, Integers]]) -> list[tuple[float, int, Integers]]:
     """Return the strongest places that do not overlap."""
     chosen: list[tuple[float, int, Integers]] = []
     for value, r, rows in places:
-        if all(r != other or rows[0] > own[-1] or rows[-1] < own[0] for _, other, own in chosen):
+        if all(r != other or rows[0, 0] > own[-1, -1] or rows[-1, -1] < own[0, 0] for _, other, own in chosen):
             chosen.append((value, r, rows))
         if len(chosen) == STRONGEST:
             break

@@ -71,6 +71,7 @@ class FamilyAlarm:
         """
         residual = FitResidual(fit)
         tests = noise_tests(residual) | _variance_tests(residual) | noise_tests(residual, in_residual=False)
+        tests |= structure_tests(fit)
         return FamilyAlarm(EvidenceAlarm.of(evidence, rng, draws), tests, level)
 
     @property
