@@ -119,9 +119,9 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     )
     if result.bodies_fixed:
         yield (
-            "Every fit of the present model drove its bodies to values that their prior all but excludes. The bodies "
-            "are therefore fixed at the prior's centre, and the effect of each candidate is computed along the "
-            "measured motion."
+            "The present model follows the data only with unknowns that their prior all but excludes, or not at all. "
+            "The bodies are therefore fixed at the prior's centre, and the effect of each candidate is computed along "
+            "the measured motion."
         )
     if result.bounded is not None:
         yield result.bounded
