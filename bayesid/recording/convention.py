@@ -50,10 +50,10 @@ class Convention:
 
 
 def in_one_line(remedy: str) -> str:
-    """Return the lines of a remedy as ``[section] key = value; key = value``."""
+    """Return the lines of a remedy as ``[section] key = value; key = value``, further sections after "and"."""
     text = ""
     for line in filter(None, remedy.splitlines()):
-        between = "" if not text else " " if text.endswith(HEADER_END) or line.startswith("[") else "; "
+        between = "" if not text else " " if text.endswith(HEADER_END) else " and " if line.startswith("[") else "; "
         text += f"{between}{line}{HEADER_END if line.startswith('[') else ''}"
     return text.replace(HEADER_END, "")
 

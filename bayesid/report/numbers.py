@@ -53,7 +53,7 @@ def format_quantity(mean: float, sd: float) -> str:
     rounded = float(f"{sd:.1e}")
     power = max(_power(mean), _power(rounded)) if mean else _power(rounded)
     decimals = 1 - _power(rounded)
-    if SMALLEST < power < LARGEST and not (power < 0 and decimals > 6):
+    if SMALLEST < power < LARGEST and not (power < -1 and decimals > 6):
         return f"{format_fixed(mean, decimals)} ± {format_fixed(rounded, decimals)}"
     places, unit = decimals + power, 10.0**power
     return f"({format_fixed(mean / unit, places)} ± {format_fixed(rounded / unit, places)}) × 10{_raise(power)}"
