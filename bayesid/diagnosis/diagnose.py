@@ -117,10 +117,10 @@ def diagnose(
     search = search_models(perturbed, present.fit, considered, rng, progress, bodies_fixed=present.held)
     if not present.held and improbable(present.fit, settings) and not search.alarm.silent:
         progress(0.6, "weighing the causes along the motion in the data")
-        near, held = _fitted(start, settings, hold=True)
-        along = search_models(near, held.fit, considered, rng, progress, bodies_fixed=True)
+        with_bodies, fixed = _fitted(start, settings, hold=True)
+        along = search_models(with_bodies, fixed.fit, considered, rng, progress, bodies_fixed=True)
         if along.highest > search.highest:
-            perturbed, present, search = near, held, along
+            perturbed, present, search = with_bodies, fixed, along
     before = Hypothesis(perturbed, present.fit)
     progress(0.65, "fitting the most probable causes")
     search, fitted = with_misfit(search, catalogue, settings)

@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.candidates.axis_sizes import with_axis_sizes
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
-from bayesid.diagnosis.candidates.linear_model import SignatureBank, Signatures
+from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank, Signatures
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.settings import FULL
@@ -97,6 +99,17 @@ class GenericCause(CauseKind):
     def suggested(self, perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
         """Return the bank of bursts."""
         return burst_signatures(perturbed, fit)
+
+    def refined(
+        self,
+        point: Linearisation,
+        probabilities: SetProbabilities,
+        effects: Sequence[Effect],
+        bounds: Bounds,
+        least: float,
+    ) -> Linearisation:
+        """Return the linear model in which the axes of smooth disturbances also have sizes of their own."""
+        return with_axis_sizes(point, probabilities)
 
 
 def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:

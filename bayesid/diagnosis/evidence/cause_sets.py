@@ -26,6 +26,7 @@ MOST_CAUSES = 3
 
 FEW = 300  # extensions of all sets of one size up to which none is left out
 BEST = 20  # sets of two and more candidates that are extended where there are more extensions than few
+BESIDE = 4  # best sets without a generic candidate beside which the forms of each are chosen
 SINGLES = 16  # single candidates that are extended to pairs where there are many
 
 PROMISING = 1e-4
@@ -303,17 +304,26 @@ def _best(ranked: Iterable[CauseSet], size: int) -> list[CauseSet]:
 def _screened(
     parents: list[CauseSet], sets: list[CauseSet], evidence: SetEvidence, prior: CausePrior
 ) -> list[CauseSet]:
-    """Return the sets of one candidate more than their parents; those that matter are integrated in full."""
+    """Return the sets of one candidate more than their parents; those that matter are integrated in full.
+
+    A generic candidate has other forms beside a cause than by itself: beside the best sets that have none it is added
+    last, too.
+    """
+    named = sorted((one for one in parents if one.generic is None), key=lambda one: -one.log_evidence)[:BESIDE]
+
+    def others(parent: CauseSet) -> list[str]:
+        return [*_others(parent, evidence), *(evidence.generics if parent in named else ())]
 
     def gains(parent: CauseSet) -> tuple[dict[str, int], dict[str, dict[int, float]]]:
         forms = evidence.forms(parent.names)
-        return forms, evidence.gains_beside(parent.names, forms, _others(parent, evidence))
+        return forms, evidence.gains_beside(parent.names, forms, others(parent))
 
     weighed: dict[_Key, tuple[float, list[dict[str, int]]]] = {}
-    grown = [parent for parent in parents if _others(parent, evidence)]
+    grown = [parent for parent in parents if others(parent)]
     for parent, (forms, each) in zip(grown, in_threads(gains, grown), strict=True):
         for name, values in each.items():
-            key = (tuple(sorted((*parent.causes, name))), parent.generic)
+            generic = name in evidence.generics
+            key = (parent.causes, name) if generic else (tuple(sorted((*parent.causes, name))), parent.generic)
             gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
             before, choices = weighed.get(key, (-np.inf, []))
             more = [{**forms, name: form} for form in near_best(values)]

@@ -29,7 +29,7 @@ from bayesid.diagnosis.evidence.scales import CandidateCause, thinning
 __all__ = ["SetEvidence", "near_best"]
 
 FEW_COMBINATIONS = 8  # combinations of the forms of a set up to which all are integrated
-MOST_FORMS = 12  # forms of one cause that are weighed beside a set: those that do best by themselves
+MOST_FORMS = 20  # forms of one cause that are weighed beside a set: those that do best by themselves
 FORMS_NEAR, MOST_NEAR = 4.0, 4  # nats below a cause's best form of those evaluated in full, and how many at most
 BLOCK = 4_000_000  # numbers in one intermediate array where many scores are evaluated at once
 
