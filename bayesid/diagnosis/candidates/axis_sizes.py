@@ -9,7 +9,7 @@ choice, so that it is that of an average over each ratio to the largest, which i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats, Integers, log_sum
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank
-from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import NEAR, SetProbabilities
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 
 __all__ = ["axis_sizes", "with_axis_sizes"]
 
@@ -92,10 +93,18 @@ def _charge(information: Floats, score: Floats, deviations: Floats, here: NDArra
     return max(float(each[-1] - log_sum(each[:-1])) + float(np.log(POINTS)), 0.0)
 
 
-def with_axis_sizes(point: Linearisation, probabilities: SetProbabilities) -> Linearisation:
-    """Return the linear model in which smooth disturbances also have axes of different sizes.
+class _Form(NamedTuple):
+    """Form of a disturbance with axes of sizes of their own: its share, and the weight of a set with it [nats]."""
 
-    They are learnt beside every choice among the causes of the most probable set that has any.
+    group: AmplitudeGroup
+    share: float
+    log_weight: float
+
+
+def with_axis_sizes(point: Linearisation, probabilities: SetProbabilities) -> Linearisation:
+    """Return the linear model in which smooth disturbances also have axes of different sizes, where that matters.
+
+    The sizes are those of most evidence beside every choice among the causes of the most probable set that has any.
 
     Parameters
     ----------
@@ -103,41 +112,48 @@ def with_axis_sizes(point: Linearisation, probabilities: SetProbabilities) -> Li
     probabilities : SetProbabilities
     """
     best = next((one.causes for one in probabilities.sets if one.causes), ())
-    causes = []
-    for cause in point.bank.causes:
-        if cause.generic:
-            new = [form for beside in _choices(best) for form in _learnt(point, cause, beside)]
-            if new:
-                shares = [(1.0 - SHARE) * float(np.exp(variant.log_weight)) for variant in cause.variants]
-                others = (*cause.others, *((group,) for group, _ in new))
-                further = (SHARE * share / len(new) for _, share in new)
-                cause = replace(cause, others=others, shares=(*shares, *further))
-        causes.append(cause)
-    return point.with_bank(SignatureBank(point.bank.signatures, tuple(causes)))
+    chosen = [names for size in range(len(best) + 1) for names in combinations(best, size)]
+    forms = {
+        cause.name: [form for names in chosen for form in _beside(point, cause, names, probabilities)]
+        for cause in point.bank.causes
+        if cause.generic
+    }
+    least = max(one.log_evidence + one.log_prior for one in probabilities.sets) - NEAR
+    if max((form.log_weight for each in forms.values() for form in each), default=-np.inf) < least:
+        return point
+    causes = tuple(_with_forms(cause, forms.get(cause.name, [])) for cause in point.bank.causes)
+    return point.with_bank(SignatureBank(point.bank.signatures, causes))
 
 
-def _choices(causes: tuple[str, ...]) -> list[tuple[str, ...]]:
-    return [chosen for size in range(len(causes) + 1) for chosen in combinations(causes, size)]
+def _with_forms(cause: CandidateCause, forms: Sequence[_Form]) -> CandidateCause:
+    if not forms:
+        return cause
+    shares = [(1.0 - SHARE) * float(np.exp(variant.log_weight)) for variant in cause.variants]
+    shares += [SHARE * form.share / len(forms) for form in forms]
+    return replace(cause, others=(*cause.others, *((form.group,) for form in forms)), shares=tuple(shares))
 
 
-def _learnt(
-    point: Linearisation, cause: CandidateCause, beside: tuple[str, ...]
-) -> Iterator[tuple[AmplitudeGroup, float]]:
-    """Yield the most probable form of a disturbance beside some causes with the sizes of its axes, and its share."""
+def _beside(
+    point: Linearisation, cause: CandidateCause, names: tuple[str, ...], probabilities: SetProbabilities
+) -> Iterator[_Form]:
+    """Yield the most probable form of a disturbance beside some causes, with the sizes of its axes."""
     evidence = point.evidence
-    names = (*beside, cause.name)
-    forms = evidence.forms(names)
+    forms = evidence.forms((*names, cause.name))
     variant = cause.variants[forms[cause.name]]
     (group,) = variant.groups
     if group.spread is None:
         return
     kept = np.flatnonzero(group.spread)
     axes = _axes(point.bank, group.name)[kept]
-    gram = evidence.beside(beside, {name: forms[name] for name in beside}, [group.name])
+    gram = evidence.beside(names, {name: forms[name] for name in names}, [group.name])
     sizes = axis_sizes(gram.matrix[np.ix_(kept, kept)], gram.score[kept], group.spread[kept], axes)
     spread = np.zeros(len(group.spread))
     spread[kept] = group.spread[kept] * sizes.ratios[axes]
-    yield replace(group, spread=spread), float(np.exp(variant.log_weight - sizes.charge))
+    group, share = replace(group, spread=spread), float(np.exp(variant.log_weight - sizes.charge))
+    gain = SetEvidence(gram, [CandidateCause(cause.name, (group,))]).of_forms(cause.name)[0] + np.log(SHARE * share)
+    counts = len(probabilities.causes), True, len(probabilities.generics)
+    log_prior = probabilities.prior.log_probability(len(names), *counts)
+    yield _Form(group, share, float(gain) + log_prior + (evidence.log_evidence(names) if names else 0.0))
 
 
 def _axes(bank: SignatureBank, group: str) -> Integers:

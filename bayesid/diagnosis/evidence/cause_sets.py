@@ -19,7 +19,7 @@ from bayesid._math.arrays import log_sum
 from bayesid._math.threads import in_threads
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence, near_best
 
-__all__ = ["CausePrior", "CauseSet", "SetProbabilities", "enumerate_sets"]
+__all__ = ["NEAR", "CausePrior", "CauseSet", "SetProbabilities", "enumerate_sets"]
 
 MOST_CAUSES = 3
 """Most causes of the catalogue in one set; a generic candidate may stand beside them."""
