@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from bayesid.diagnosis.candidates.axis_sizes import SMALLEST, axis_sizes
+from bayesid.diagnosis.candidates.axis_sizes import axis_sizes
 
 WAVES = 12
 SPREAD = 1.0 / (1.0 + (np.arange(WAVES) / 4.0) ** 4)
@@ -43,17 +43,17 @@ def test_an_absent_axis_is_as_small_as_the_data_can_resolve():
 
 @pytest.mark.parametrize("deviations", [[0.2, 1.0], [1.0, 1.0], [0.03, 1.0]])
 def test_the_charge_is_that_of_an_average_over_all_ratios(deviations):
-    """The evidence at the sizes less the charge, beside the mean over ratios that are log-uniform, the scale fixed."""
+    """The evidence at the sizes less the charge, beside the mean over uniform ratios of standard deviations."""
     for seed in range(5):
         information, score, spread, axes = drawn(deviations, seed)
         sizes = axis_sizes(information, score, spread, axes)
         largest = int(np.argmax(sizes.ratios))
         scales = np.exp(np.linspace(np.log(0.05), np.log(20.0), 60))
-        ratios = np.exp(np.linspace(np.log(SMALLEST), 0.0, 120))
+        ratios = (np.arange(200) + 0.5) / 200
         each = np.array(
             [
                 [
-                    log_evidence(information, score, spread * scale * np.where(axes == largest, 1.0, ratio))
+                    log_evidence(information, score, spread * scale * np.where(axes == largest, 1.0, ratio**2))
                     for ratio in ratios
                 ]
                 for scale in scales

@@ -3,8 +3,9 @@
 A smooth disturbance of equal variance about all axes pays for every axis on which it is absent: an error of one
 gyro axis, or a torque about two axes, loses dozens of nats to causes that act on these alone and imitate it. It may
 therefore also have a size of its own about each axis. Beside some causes, the sizes of most evidence are found by
-the update of D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992; their evidence is charged for the
-choice, so that it is that of an average over each ratio to the largest, which is log-uniform.
+the update of D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992. Their evidence is charged for the
+choice, so that it is that of an average over the ratio of each axis' standard deviation to the largest. The ratio is
+uniform: a torque that points anywhere is seldom about one base axis alone, and what is is rather a wheel.
 """
 
 from __future__ import annotations
@@ -87,10 +88,11 @@ def _charge(information: Floats, score: Floats, deviations: Floats, here: NDArra
     values, vectors = np.linalg.eigh(information[np.ix_(here, here)] - share.T @ share)
     squares = (vectors.T @ (score[here] - share.T @ others.share(score[~here]))) ** 2
     chosen = deviations[here][0] ** 2
-    variances = np.append(largest * np.exp(np.linspace(np.log(SMALLEST), 0.0, POINTS)), chosen)[:, None]
+    ratios = np.exp(np.linspace(0.5 * np.log(SMALLEST), 0.0, POINTS))  # of deviations, with weights for a uniform prior
+    variances = np.append(largest * ratios**2, chosen)[:, None]
     visible = 1.0 + variances * np.maximum(values, 0.0)
     each = 0.5 * (variances / visible * squares - np.log(visible)).sum(axis=1)
-    return max(float(each[-1] - log_sum(each[:-1])) + float(np.log(POINTS)), 0.0)
+    return max(float(each[-1] - log_sum(each[:-1] + np.log(ratios / ratios.sum()))), 0.0)
 
 
 class _Form(NamedTuple):
