@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
-from bayesid.diagnosis import Diagnosis, Status, diagnose
+from bayesid.diagnosis import Diagnosis, Rest, Status, diagnose
 from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.blocks import BLOCKS_PER_SECOND
@@ -211,7 +211,11 @@ def test_fast_telemetry_without_a_cause_is_adequate(tmp_path):
     )
 
 
-def test_a_mass_that_moves_for_seconds_is_unknown_in_fast_telemetry(tmp_path):
-    """A part moves by 15 mm in two seconds, a dozen standard deviations in all: the verdict was adequate."""
+def test_a_mass_that_moves_for_seconds_is_no_adequate_model(tmp_path):
+    """A part moves by 15 mm in two seconds, a dozen standard deviations in all: the verdict was adequate.
+
+    No cause of the catalogue lasts as long, so that something unnamed is present, whatever is named beside it.
+    """
     moved = diagnosed(fast_case("shifting-mass", hide.shifting_mass, status="unknown", flown=0.05).make(tmp_path, 1))
-    assert moved.verdict.status is Status.UNKNOWN
+    assert moved.verdict.status in (Status.UNKNOWN, Status.PARTLY_EXPLAINED)
+    assert moved.verdict.remainder.verdict is Rest.PRESENT

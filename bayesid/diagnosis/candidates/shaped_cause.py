@@ -333,7 +333,8 @@ def _with_exact_gains(
 def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[str, ...]]:
     """Return nothing, the most probable sets of other causes, and what is most probable beside something generic.
 
-    All of the most probable sets may hold a cause that stands for the shape. Something generic stands for it as well.
+    All of the most probable sets may hold a cause that stands for the shape, as something generic may: the most
+    probable one counts without each of its causes, too.
     """
     companies: dict[tuple[str, ...], None] = {(): None}
     for cause_set in probabilities.sets:
@@ -341,6 +342,8 @@ def _companies(probabilities: SetProbabilities, mine: set[str]) -> list[tuple[st
             companies[_others(cause_set, mine)] = None
         if len(companies) == COMPANIES:
             break
+    best = next(filter(None, companies), ())
+    companies |= {tuple(name for name in best if name != left_out): None for left_out in best}
     unnamed = next((cause_set for cause_set in probabilities.sets if cause_set.generic is not None), None)
     return list(companies if unnamed is None else companies | {_others(unnamed, mine): None})
 
