@@ -205,10 +205,10 @@ def test_shapes_are_proposed_beside_what_needs_something_unnamed():
     """Both of the most probable sets have a cause that stands for the shape."""
     sets = [CauseSet(("a", "b"), None, 9.0), CauseSet(("a", "c"), None, 8.5), CauseSet(("a",), None, 1.0)]
     named = SetProbabilities.of(sets, ("a", "b", "c"), ("u",), CausePrior())
-    assert shaped_cause._companies(named, {"c"}) == [(), ("a", "b"), ("a",)]
-    assert shaped_cause._companies(named, set()) == [(), ("a", "b"), ("a", "c")]
-    unnamed = named.with_sets([*sets, CauseSet(("a",), "u", 8.0)])
-    assert shaped_cause._companies(unnamed, set()) == [(), ("a", "b"), ("a", "c"), ("a",)]
+    assert shaped_cause._companies(named, {"c"}) == [(), ("a", "b"), ("a",), ("b",)]
+    assert shaped_cause._companies(named, set()) == [(), ("a", "b"), ("a", "c"), ("b",), ("a",)]
+    unnamed = named.with_sets([*sets, CauseSet(("c",), "u", 8.0)])
+    assert shaped_cause._companies(unnamed, set()) == [(), ("a", "b"), ("a", "c"), ("b",), ("a",), ("c",)]
 
 
 # where two causes part ------------------------------------------------------------------------------------------------
