@@ -22,7 +22,7 @@ from studies.common.provenance import ROOT, commit
 NUMBERS = ("bayesid", "studies/common", "studies/truth")
 WORDS = ("bayesid/report", "bayesid/_io/words.py", "studies/common/report_parts.py", "studies/common/figures.py")
 CODE = (".py", ".urdf", ".xml", ".toml", ".csv")  # endings of files that figures depend on
-REPORT = "report.py"  # file of a study that makes words and pictures
+OF_REPORT = ("report.py", "goals.py", "rows.py")  # files of a study that judge, word and draw what was computed
 
 
 class CodeVersion(NamedTuple):
@@ -83,7 +83,7 @@ def _pieces(study: str) -> Iterator[str]:
     """Yield name and content of every file that makes numbers, in the order of their names."""
     own = ROOT / "studies" / study
     folders = [*(ROOT / name for name in NUMBERS), own]
-    words = [*(ROOT / name for name in WORDS), own / REPORT]
+    words = [*(ROOT / name for name in WORDS), *(own / name for name in OF_REPORT)]
     for file in sorted(file for folder in folders for file in folder.rglob("*")):
         if file.suffix in CODE and not any(file.is_relative_to(word) for word in words):
             yield f"{file.relative_to(ROOT)} {_content(file)}"

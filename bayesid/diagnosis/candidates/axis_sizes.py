@@ -10,20 +10,17 @@ uniform: a torque that points anywhere is seldom about one base axis alone, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats, Integers, log_sum
+from bayesid.diagnosis.candidates.further_forms import Chosen, with_further_forms
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank
-from bayesid.diagnosis.evidence.cause_sets import NEAR, SetProbabilities
-from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
+from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
+from bayesid.diagnosis.evidence.scales import Variant
 
 __all__ = ["axis_sizes", "with_axis_sizes"]
 
@@ -35,9 +32,6 @@ POINTS = 40
 
 UPDATES = 8
 """Updates of the sizes, after which they hardly change."""
-
-SHARE = 0.5
-"""Prior probability that the axes have sizes of their own."""
 
 
 class AxisSizes(NamedTuple):
@@ -95,14 +89,6 @@ def _charge(information: Floats, score: Floats, deviations: Floats, here: NDArra
     return max(float(each[-1] - log_sum(each[:-1] + np.log(ratios / ratios.sum()))), 0.0)
 
 
-class _Form(NamedTuple):
-    """Form of a disturbance with axes of sizes of their own: its share, and the weight of a set with it [nats]."""
-
-    group: AmplitudeGroup
-    share: float
-    log_weight: float
-
-
 def with_axis_sizes(point: Linearisation, probabilities: SetProbabilities) -> Linearisation:
     """Return the linear model in which smooth disturbances also have axes of different sizes, where that matters.
 
@@ -113,49 +99,18 @@ def with_axis_sizes(point: Linearisation, probabilities: SetProbabilities) -> Li
     point : Linearisation
     probabilities : SetProbabilities
     """
-    best = next((one.causes for one in probabilities.sets if one.causes), ())
-    chosen = [names for size in range(len(best) + 1) for names in combinations(best, size)]
-    forms = {
-        cause.name: [form for names in chosen for form in _beside(point, cause, names, probabilities)]
-        for cause in point.bank.causes
-        if cause.generic
-    }
-    least = max(one.log_evidence + one.log_prior for one in probabilities.sets) - NEAR
-    if max((form.log_weight for each in forms.values() for form in each), default=-np.inf) < least:
-        return point
-    causes = tuple(_with_forms(cause, forms.get(cause.name, [])) for cause in point.bank.causes)
-    return point.with_bank(SignatureBank(point.bank.signatures, causes))
 
+    def choose(variant: Variant, gram: Gram) -> Chosen:
+        (group,) = variant.groups
+        spread = np.ones(len(gram.groups[group.name])) if group.spread is None else group.spread
+        present = np.flatnonzero(spread)
+        axes = _axes(point.bank, group.name)[present]
+        sizes = axis_sizes(gram.matrix[np.ix_(present, present)], gram.score[present], spread[present], axes)
+        sized = np.zeros(len(spread))
+        sized[present] = spread[present] * sizes.ratios[axes]
+        return Chosen(sized, variant.log_weight - sizes.charge)
 
-def _with_forms(cause: CandidateCause, forms: Sequence[_Form]) -> CandidateCause:
-    if not forms:
-        return cause
-    shares = [(1.0 - SHARE) * float(np.exp(variant.log_weight)) for variant in cause.variants]
-    shares += [SHARE * form.share / len(forms) for form in forms]
-    return replace(cause, others=(*cause.others, *((form.group,) for form in forms)), shares=tuple(shares))
-
-
-def _beside(
-    point: Linearisation, cause: CandidateCause, names: tuple[str, ...], probabilities: SetProbabilities
-) -> Iterator[_Form]:
-    """Yield the most probable form of a disturbance beside some causes, with the sizes of its axes."""
-    evidence = point.evidence
-    forms = evidence.forms((*names, cause.name))
-    variant = cause.variants[forms[cause.name]]
-    (group,) = variant.groups
-    if group.spread is None:
-        return
-    kept = np.flatnonzero(group.spread)
-    axes = _axes(point.bank, group.name)[kept]
-    gram = evidence.beside(names, {name: forms[name] for name in names}, [group.name])
-    sizes = axis_sizes(gram.matrix[np.ix_(kept, kept)], gram.score[kept], group.spread[kept], axes)
-    spread = np.zeros(len(group.spread))
-    spread[kept] = group.spread[kept] * sizes.ratios[axes]
-    group, share = replace(group, spread=spread), float(np.exp(variant.log_weight - sizes.charge))
-    gain = SetEvidence(gram, [CandidateCause(cause.name, (group,))]).of_forms(cause.name)[0] + np.log(SHARE * share)
-    counts = len(probabilities.causes), True, len(probabilities.generics)
-    log_prior = probabilities.prior.log_probability(len(names), *counts)
-    yield _Form(group, share, float(gain) + log_prior + (evidence.log_evidence(names) if names else 0.0))
+    return with_further_forms(point, probabilities, choose)
 
 
 def _axes(bank: SignatureBank, group: str) -> Integers:

@@ -9,7 +9,9 @@ import numpy as np
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.candidates.axis_sizes import with_axis_sizes
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
+from bayesid.diagnosis.candidates.imitations import with_imitations
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank, Signatures
+from bayesid.diagnosis.candidates.tones import with_tones
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
@@ -108,8 +110,9 @@ class GenericCause(CauseKind):
         bounds: Bounds,
         least: float,
     ) -> Linearisation:
-        """Return the linear model in which the axes of smooth disturbances also have sizes of their own."""
-        return with_axis_sizes(point, probabilities)
+        """Return the linear model in which disturbances have tones and sizes of each axis, and imitate causes."""
+        tones = with_tones(point, probabilities, TORQUE)
+        return with_imitations(with_axis_sizes(tones, probabilities), probabilities)
 
 
 def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:

@@ -213,7 +213,7 @@ class InstantCause(CauseKind):
             shares=(*((1.0 - SHARE) * np.exp(variant.log_weight) for variant in cause.variants), share),
         )
         causes = tuple(tuned if one is cause else one for one in point.bank.causes)
-        return point.with_bank(SignatureBank((*point.bank.signatures, item), causes))
+        return point.with_bank(replace(point.bank, signatures=(*point.bank.signatures, item), causes=causes))
 
     def _sought(
         self,

@@ -6,7 +6,7 @@ A signature is what a candidate would change in the whitened residual, per unit 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -59,6 +59,11 @@ class Signatures:
     order: float | None = None
     effect: Effect | None = None
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether the columns have neither a frequency, nor an instant, nor any other shape."""
+        return all(shape is None for shape in (self.tone, self.instants, self.order, self.effect))
+
 
 @dataclass(frozen=True)
 class SignatureBank:
@@ -68,23 +73,28 @@ class SignatureBank:
     ----------
     signatures : tuple of Signatures
     causes : tuple of CandidateCause
+    unions : mapping of str to tuple of str
+        Groups that consist of other groups, by their names.
     """
 
     signatures: tuple[Signatures, ...] = ()
     causes: tuple[CandidateCause, ...] = ()
+    unions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @staticmethod
     def joined(banks: Iterable[SignatureBank]) -> SignatureBank:
         """Return several banks as one; groups of one name are the same and kept once."""
         found: dict[str, list[Signatures]] = {}
         causes: list[CandidateCause] = []
+        unions: dict[str, tuple[str, ...]] = {}
         for bank in banks:
             new: dict[str, list[Signatures]] = {}
             for item in bank.signatures:
                 new.setdefault(item.name, []).append(item)
             found = new | found
             causes += bank.causes
-        return SignatureBank(tuple(item for items in found.values() for item in items), tuple(causes))
+            unions |= bank.unions
+        return SignatureBank(tuple(item for items in found.values() for item in items), tuple(causes), unions)
 
     @property
     def memory(self) -> int:
@@ -94,7 +104,7 @@ class SignatureBank:
     def without_columns(self) -> SignatureBank:
         """Return the bank with the names, tones and instants of its signatures alone."""
         bare = tuple(replace(item, columns=np.zeros((0, item.columns.shape[1]))) for item in self.signatures)
-        return SignatureBank(bare, self.causes)
+        return replace(self, signatures=bare)
 
 
 class Fitted(Protocol):
@@ -207,8 +217,8 @@ class SignatureProducts:
                 beside.append((np.arange(first, last), columns))
         return SignatureProducts(fit, (*self.signatures, *ordered), (*self.places, *places), matrix, score, shared)
 
-    def gram(self) -> Gram:
-        """Return the Gram of all signatures beside the model's own unknowns.
+    def gram(self, unions: Mapping[str, tuple[str, ...]] | None = None) -> Gram:
+        """Return the Gram of all signatures beside the model's own unknowns, with groups that consist of others.
 
         The products of signatures less those of what the unknowns take are exact to a part in 1e16 of the former. Only
         a signature that the unknowns imitate to a part in 1e6 of its length would be lost in that; at the physical
@@ -221,6 +231,8 @@ class SignatureProducts:
         groups: dict[str, Integers] = {}
         for item, where in zip(self.signatures, self.places, strict=True):
             groups[item.name] = np.concatenate([groups.get(item.name, np.zeros(0, dtype=int)), where])
+        for name, parts in (unions or {}).items():
+            groups[name] = np.concatenate([groups[part] for part in parts])
         matrix = taken.T @ taken
         np.subtract(self.matrix, matrix, out=matrix)
         return Gram.owning(matrix, self.score - taken.T @ pull, groups)
@@ -290,7 +302,7 @@ class Linearisation:
             About the same fit with a bank that differs little, of which what agrees is taken.
         """
         products = SignatureProducts.of(bank.signatures, fit, None if like is None else like.products)
-        gram = products.gram()
+        gram = products.gram(bank.unions)
         amplitudes = _amplitudes(present, gram)
         unknowns, z = GaussianBlock.of(fit.own.T @ fit.own), fit.own_coordinates
         moved = unknowns.share(fit.own.T @ fit.residual + z)

@@ -113,7 +113,7 @@ class OrderLineCause(CauseKind):
         tuned = replace(cause, others=tuple(forms[1:]), shares=(SHARE, *(share,) * (len(forms) - 1)))
         kept = [one for one in point.bank.signatures if not _is_line(one, effect) or one.order == 1.0]
         causes = tuple(tuned if one is cause else one for one in point.bank.causes)
-        return point.with_bank(SignatureBank((*kept, *signatures), causes))
+        return point.with_bank(replace(point.bank, signatures=(*kept, *signatures), causes=causes))
 
 
 def order_spectrum(view: ResidualView, fit: Fit, effect: WheelImbalance) -> tuple[Floats, Floats, float]:

@@ -179,7 +179,7 @@ class ShapedCause(CauseKind):
                 label = f"{effect.label} tuned with {' + '.join(causes) or 'nothing'}"
                 (columns,) = responses_of(point.perturbed, point.fit, [exact])
                 items, groups = form_of(label, self.with_names(exact, names), columns, bounds[effect.label])
-                bank = SignatureBank((*bank.signatures, *items), bank.causes)
+                bank = replace(bank, signatures=(*bank.signatures, *items))
                 forms.append(groups)
                 log_shares.append(log_share)
             if not forms:
@@ -192,7 +192,7 @@ class ShapedCause(CauseKind):
                 shares=(*weights, *(SHARE * float(np.exp(max(share, -200.0))) / len(forms) for share in log_shares)),
             )
             others = tuple(more if one is cause else one for one in bank.causes)
-            bank = SignatureBank(bank.signatures, others)
+            bank = replace(bank, causes=others)
         return point if bank is point.bank else point.with_bank(bank)
 
     def _best_by_company(

@@ -123,7 +123,7 @@ class VibrationCause(CauseKind):
             if effect.label in beside:
                 tuned = _tuned(point, effect, bounds[effect.label], list(beside[effect.label]), couplings)
                 causes = tuple(cause for cause in bank.causes if cause.name != effect.label)
-                bank = SignatureBank.joined([SignatureBank(bank.signatures, causes), tuned])
+                bank = SignatureBank.joined([replace(bank, causes=causes), tuned])
         return point.with_bank(bank) if beside else point
 
     def starts(self, effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:

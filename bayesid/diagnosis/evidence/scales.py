@@ -155,6 +155,18 @@ class CandidateCause:
         shares = self.shares or (1.0 / len(forms),) * len(forms)
         return tuple(Variant(groups, float(np.log(share))) for groups, share in zip(forms, shares, strict=True))
 
+    def in_forms(self, places: Sequence[int]) -> CandidateCause:
+        """Return the cause with some of its forms, each with the share of the prior that it has among all.
+
+        Parameters
+        ----------
+        places : sequence of int
+            Places among the `variants`.
+        """
+        chosen = [self.variants[place] for place in places]
+        shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
+        return replace(self, groups=chosen[0].groups, others=tuple(form.groups for form in chosen[1:]), shares=shares)
+
     def rescaled(self, gram: Gram, bound: float = 1.0, floor: float = 1.0) -> CandidateCause:
         """Return the cause with the bounds of its scales and the floors multiplied by factors.
 

@@ -181,7 +181,7 @@ class SetEvidence:
         self, names: Sequence[str], forms: Mapping[str, int], others: Mapping[str, Sequence[int]]
     ) -> SetEvidence:
         """Return the evidence of other causes, each in some of its forms, on what a set leaves them."""
-        causes = [_with_forms(self.causes[name], places) for name, places in others.items()]
+        causes = [self.causes[name].in_forms(places) for name, places in others.items()]
         groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
         return SetEvidence(self.beside(names, forms, groups), causes)
 
@@ -447,12 +447,3 @@ class SetEvidence:
             products = part[:, upper[0]] * part[:, upper[1]]
             log_evidence[start : start + step] = log_sums(products @ weights.T + log_weights - half_log_det)
         return log_evidence
-
-
-def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
-    """Return a cause with some of its forms, each with the share of the prior that it has among all."""
-    chosen = [cause.variants[place] for place in places]
-    shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
-    return replace(
-        cause, groups=chosen[0].groups, others=tuple(variant.groups for variant in chosen[1:]), shares=shares
-    )

@@ -124,7 +124,7 @@ def disturbing_wrench(
     columns = np.concatenate(parts, axis=1)
     places = np.split(np.arange(columns.shape[1]), np.cumsum([part.shape[1] for part in parts])[:-1])
     gram = Gram(fit.project(columns, rows), columns.T @ fit.residual[rows], dict(zip(names, places, strict=True)))
-    causes = [cause for cause in bank.causes if cause.name in names]
+    causes = [_of_courses(cause) for cause in bank.causes if cause.name in names]
     disturbance = _composed(hypothesis, gram, columns, causes, name_frame, recordings)
     smooth = disturbance.columns
     block = GaussianBlock.of(disturbance.matrix, disturbance.deviations)
@@ -329,6 +329,12 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
         columns, deviations = np.concatenate([columns, gram.groups[name][where]]), np.concatenate([deviations, sigma])
         left = gram.conditioned(columns, deviations)
     return columns, deviations, total
+
+
+def _of_courses(cause: CandidateCause) -> CandidateCause:
+    """Return a disturbance in those of its forms that are courses in time alone."""
+    names = [form.groups[0].name for form in cause.variants]
+    return cause.in_forms([place for place, name in enumerate(names) if name == names[0]])
 
 
 def _whole_columns(bank: SignatureBank, name: str, recordings: Sequence[int]) -> Floats:
