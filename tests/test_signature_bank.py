@@ -186,6 +186,8 @@ def test_products_of_signatures_that_join_others_are_those_of_all_together():
         for name in "abcd":
             own = [where for item, where in zip(every, products.places, strict=True) if item.name == name]
             np.testing.assert_array_equal(gram.groups[name], np.concatenate(own))
+        union = products.gram({"a and d": ("a", "d")}).groups["a and d"]
+        np.testing.assert_array_equal(union, np.concatenate([gram.groups["a"], gram.groups["d"]]))
 
 
 SETS = (

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bayesid.diagnosis import Status
+from bayesid.report.numbers import NO_VALUE
 from bayesid.report.verdict_record import Record, Share, record_sentence, shipped_record
 from studies.blind_injections import STUDY, Campaign, Trial, plan, run
 from studies.blind_injections.goals import (
@@ -28,6 +29,7 @@ from studies.blind_injections.goals import (
 from studies.blind_injections.rows import (
     confusion,
     confusion_matrix,
+    parting,
     rates,
     reliability,
     scores,
@@ -115,6 +117,19 @@ def stated(probability: float | None, causes: tuple[str, ...], hidden: tuple[str
     empty = dict.fromkeys(Trial.__dataclass_fields__)
     said = {"probability": probability, "causes": causes, "hidden": hidden, "accept": ()}
     return Trial(**{**empty, **said})
+
+
+def test_the_ratios_from_which_causes_part_are_medians_over_the_trials_of_each():
+    leaks = [
+        replace(stated(None, (), ("thruster-leak",)), parting={"kicks": ratio, "thruster-pulses": None})
+        for ratio in (4.0, 5.0, 9.0)
+    ]
+    backlash = replace(stated(None, (), ("joint-backlash:joint2",)), parting={"kicks": 7.25})
+    none = replace(stated(None, (), ("rate-bias",)), parting={})
+    assert parting([backlash, *leaks, none]) == [
+        ["thruster-leak", NO_VALUE, "never", "5.0", *[NO_VALUE] * 4],
+        ["joint-backlash", NO_VALUE, NO_VALUE, "7.2", *[NO_VALUE] * 4],
+    ]
 
 
 def test_stated_probabilities_are_compared_with_how_often_they_held():

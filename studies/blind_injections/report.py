@@ -19,7 +19,7 @@ from bayesid.report.numbers import format_number
 from studies.blind_injections import goals, rows
 from studies.blind_injections.goals import SURE, share_text, surely_misnamed
 from studies.blind_injections.limits import DRAWS
-from studies.blind_injections.trials import Trial, plan, read
+from studies.blind_injections.trials import ALIKE, Trial, plan, read
 from studies.blind_injections.trials import run as make_trials
 from studies.common.monte_carlo import Workers
 from studies.common.report_parts import add_number_table
@@ -96,7 +96,7 @@ def _report(campaign: Campaign) -> Report[Campaign]:
         "Residual of an outside effect: the same for the part of it that the most probable set of known causes does "
         "not absorb either; only this part could reveal that the named causes are not the true ones.",
         setup=_setup(trials, planned),
-        sections=[_failures, _evidence, _calibration, _answers],
+        sections=[_failures, _evidence, _parting, _calibration, _answers],
         tables=_tables(trials),
         beside="Tables with this report: every trial with its seed and strength ({0}), the answers by case in words "
         f"({{1}}) and as a matrix of counts ({{2}}), and Brier and logarithmic scores ({{3}}). The median time of a "
@@ -203,6 +203,22 @@ def _evidence(document: Document, campaign: Campaign) -> None:
     )
 
 
+def _parting(document: Document, campaign: Campaign) -> None:
+    table = rows.parting(campaign.trials)
+    if not table:
+        return
+    document.section("Causes that resemble each other")
+    add_number_table(
+        document,
+        ["hidden", *ALIKE],
+        table,
+        "Signal-to-noise ratio from which the hidden cause and the one in the column can be distinguished in 95 % of "
+        "all cases, if only these two are possible and both sizes are known: the median over the trials with the "
+        "hidden cause. Never: one of the two imitates the other completely. Coloured noise changes no mean and has no "
+        "such ratio; the table of answers contains what it was taken for.",
+    )
+
+
 def _calibration(document: Document, campaign: Campaign) -> None:
     trials = campaign.trials
     document.section("Calibration of stated probabilities and intervals")
@@ -268,7 +284,8 @@ def _answered(trial: Trial) -> bool:
 
 def _tables(trials: Sequence[Trial]) -> list[CsvTable]:
     fields = {name: None for trial in trials for name in asdict(trial)}
-    kept = [name for name in fields if name not in ("probabilities", "amplitude_errors", "body_errors", "seconds")]
+    long = ("probabilities", "amplitude_errors", "body_errors", "seconds", "parting")
+    kept = [name for name in fields if name not in long]
     every = [[*(_cell(getattr(trial, name)) for name in kept), f"{trial.seconds['total']:.1f}"] for trial in trials]
     return [
         CsvTable("trials", [*kept, "seconds"], every),

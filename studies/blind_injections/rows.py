@@ -13,7 +13,7 @@ from scipy import stats
 from bayesid._math.arrays import Floats
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import NO_VALUE, format_signed
-from studies.blind_injections.trials import Trial
+from studies.blind_injections.trials import ALIKE, Trial, family
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)  # limits of the ranges of signal-to-noise ratio in the table
 STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)  # limits of the ranges of stated probability in the table
@@ -39,6 +39,25 @@ def _row(trials: Sequence[Trial]) -> list[str]:
     sums = (f"{sum(column):.1f}" for column in zip(*limits, strict=True))
     detection, naming = sums if limits else (NO_VALUE, NO_VALUE)
     return [str(len(trials)), alarmed, detection, in_set, named, naming, misnamed]
+
+
+def parting(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return the median signal-to-noise ratios from which each hidden cause of `ALIKE` parts from the others."""
+    ratios: dict[str, dict[str, list[float]]] = {}
+    for trial in trials:
+        for name, ratio in trial.parting.items():
+            own = ratios.setdefault(family(trial.hidden[0]), {})
+            own.setdefault(name, []).append(np.inf if ratio is None else ratio)
+    return [
+        [name, *(NO_VALUE if other not in ratios[name] else _ratio(ratios[name][other]) for other in ALIKE)]
+        for name in ALIKE
+        if name in ratios
+    ]
+
+
+def _ratio(values: Sequence[float]) -> str:
+    middle = float(np.median(values))
+    return f"{middle:.1f}" if np.isfinite(middle) else "never"
 
 
 def reliability(trials: Iterable[Trial]) -> list[list[str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import cycle, islice, product
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, Status, diagnose
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.outcome.candidate_table import effect_amplitude
+from bayesid.diagnosis.outcome.inseparable_causes import parting_ratio
 from bayesid.inference.perturbed_posterior import residual_of
 from bayesid.inference.posterior import Posterior
 from studies.blind_injections.limits import Limits, limits_of, what_is_left
@@ -44,6 +45,17 @@ FIRST_SEED = {False: 200, True: 300_000}
 # many of these fly in Basilisk
 COUNTS = {"effect": 1000, "unknown": 400, "adequate": 1000}
 IN_BASILISK = {"effect": 75, "unknown": 0, "adequate": 75}
+
+# causes that are easily taken for each other, without what follows a colon in their names
+ALIKE = (
+    "thruster-leak",
+    "thruster-pulses",
+    "kicks",
+    "thermal-snap",
+    "wheel-history",
+    "mass-shift",
+    "joint-backlash",
+)
 
 AnyCase = hidden_causes.Case | hidden_causes.WheelCase | BasiliskCase
 
@@ -108,6 +120,8 @@ class Trial:
     # whether anything remains beside the named causes, as the verdict says ("none", "undecided", "present"); None in
     # trials of the second release, which did not say
     remainder: str | None = None
+    # signal-to-noise ratio from which a single hidden cause of `ALIKE` parts from each other of them, None where never
+    parting: dict[str, float | None] = field(default_factory=dict)
 
     @property
     def alarmed(self) -> bool:
@@ -252,8 +266,27 @@ def make(plan: Plan) -> Trial:
         correlation=None if wrench is None else _correlation(result, wrench, plan, written),
         seconds={**result.seconds, "total": total},
         remainder=result.remainder.verdict.value,
+        parting=_parting(result, case),
         **vars(size),
     )
+
+
+def _parting(result: Diagnosis, case: AnyCase) -> dict[str, float | None]:
+    """Return from which signal-to-noise ratio the hidden cause parts from others like it; empty if it is not one."""
+    evidence, hidden = result.search.searches[0].point.evidence, case.causes[0] if len(case.causes) == 1 else ""
+    if family(hidden) not in ALIKE or hidden not in evidence.causes:
+        return {}
+    least: dict[str, float] = {}
+    for name in evidence.causes:
+        if family(name) in ALIKE and family(name) != family(hidden):
+            ratio = parting_ratio(evidence, hidden, name)
+            least[family(name)] = min(ratio, least.get(family(name), np.inf))
+    return {name: ratio if np.isfinite(ratio) else None for name, ratio in least.items()}
+
+
+def family(cause: str) -> str:
+    """Return the name of a cause without its link, joint or axis."""
+    return cause.partition(":")[0]
 
 
 def _visible(case: AnyCase) -> bool:
