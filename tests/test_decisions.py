@@ -37,6 +37,15 @@ def stated(shares: dict[tuple[str, ...], float]) -> SetProbabilities:
 CLASSES = tuple((name,) for name in "abcde")
 
 
+def test_a_fault_of_the_noise_is_not_named_beside_something_unnamed():
+    """What its courses do not follow looks like noise; without it, noise is a cause like others."""
+    beside, alone = stated({("a", "b", "unknown"): 0.95}), stated({("a", "b"): 0.95})
+    assert set(probable_verdict(beside, CLASSES, silent=False).causes) == {"a", "b"}
+    assert probable_verdict(beside, CLASSES, silent=False, noise=["b"]).causes == ("a",)
+    assert probable_verdict(beside, CLASSES, silent=False, noise=["a", "b"]).status is Status.UNKNOWN
+    assert set(probable_verdict(alone, CLASSES, silent=False, noise=["b"]).causes) == {"a", "b"}
+
+
 @pytest.mark.parametrize(
     ("shares", "status"),
     [

@@ -125,7 +125,9 @@ def diagnose(
     progress(0.65, "fitting the most probable causes")
     search, fitted = with_misfit(search, catalogue, settings)
     classes = search.classes()
-    sensitivity = verdict_sensitivity(search.probabilities, classes, search.alarm.silent, search.widened, settings)
+    sensitivity = verdict_sensitivity(
+        search.probabilities, classes, search.alarm.silent, search.widened, settings, search.noise
+    )
     verdict = sensitivity.verdict
     clock.ends("verdict")
     named = list(verdict.causes)

@@ -6,7 +6,7 @@ Bayesian model averaging: a tutorial, Statistical Science 14, 1999, on the proba
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
@@ -116,6 +116,7 @@ def probable_verdict(
     classes: Sequence[Sequence[str]],
     silent: bool,
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
+    noise: Collection[str] = (),
 ) -> ProbableVerdict:
     """Return the verdict on sets of causes.
 
@@ -128,7 +129,8 @@ def probable_verdict(
     - partly-explained: the same, and something generic has more: what remains is undecided up to 0.5, then present.
       Also where classes of 0.9 stand beside causes that are too many to name.
     - unknown: generic candidates hold the majority, and no class has 0.9, or more than two have: several that leave
-      the majority unexplained are what the catalogue offers for one effect from outside.
+      the majority unexplained are what the catalogue offers for one effect from outside. Faults of the noise do not
+      count: a disturbance has parts faster than the courses of a generic candidate, and these look like noise.
     - ambiguous: two to four alternatives hold 0.95. They are merged sets, taken in the order of their probability; each
       holds whatever includes it, so that the many improbable companions of a cause count for it and not against it, and
       what an earlier one holds is no alternative of its own. Nothing and the unknown may be among them.
@@ -143,6 +145,8 @@ def probable_verdict(
         Whether the alarm is silent.
     settings : DiagnosisSettings, optional
         With the thresholds, of which the defaults are named above.
+    noise : collection of str, optional
+        Causes that are faults of the noise.
     """
     if silent:
         return ProbableVerdict(Status.ADEQUATE, remainder=Remainder(probabilities.unknown))
@@ -153,6 +157,7 @@ def probable_verdict(
     best = next((names for names in merged if UNKNOWN not in names), frozenset[str]())
     named, others = best if best <= certain else frozenset[str](), list[frozenset[str]]()
     if remainder.verdict is Rest.PRESENT:
+        certain -= frozenset(noise)
         named = certain if len(certain) <= settings.most_beside_unnamed else frozenset()
         status = Status.PARTLY_EXPLAINED if named else Status.UNKNOWN
     elif named:
@@ -255,6 +260,7 @@ def verdict_sensitivity(
     silent: bool,
     widened: Callable[[float, float], SetProbabilities],
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
+    noise: Collection[str] = (),
 ) -> VerdictSensitivity:
     """Return the verdict with each prior number halved and doubled, and with scales a decade wider at either end.
 
@@ -270,14 +276,16 @@ def verdict_sensitivity(
     widened : callable
         Probabilities with the bounds and the floors of all scales multiplied by two factors.
     settings : DiagnosisSettings, optional
+    noise : collection of str, optional
+        Causes that are faults of the noise.
     """
     others = {
-        name: probable_verdict(probabilities.under(changed), classes, silent, settings)
+        name: probable_verdict(probabilities.under(changed), classes, silent, settings, noise)
         for name, changed in _other_priors(probabilities.prior).items()
     }
     for name, bound, floor in (("bounds a decade higher", DECADE, 1.0), ("floors a decade lower", 1.0, 1.0 / DECADE)):
-        others[name] = probable_verdict(widened(bound, floor), classes, silent, settings)
-    return VerdictSensitivity(probable_verdict(probabilities, classes, silent, settings), others)
+        others[name] = probable_verdict(widened(bound, floor), classes, silent, settings, noise)
+    return VerdictSensitivity(probable_verdict(probabilities, classes, silent, settings, noise), others)
 
 
 def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:

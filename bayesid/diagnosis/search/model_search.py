@@ -52,9 +52,14 @@ class ModelSearch:
         """Log evidence of the best explanation."""
         return max(search.highest for search in self.searches)
 
+    @property
+    def noise(self) -> set[str]:
+        """Names of the faults of the noise that were weighed."""
+        return {name for search in self.searches for name in search.noise.names}
+
     def under(self, causes: Sequence[str]) -> SetSearch:
         """Return the search under the faults of the noise that are among some causes."""
-        faulty = {name for search in self.searches for name in search.noise.names} & set(causes)
+        faulty = self.noise & set(causes)
         return next((search for search in self.searches if set(search.noise.names) == faulty), self.searches[0])
 
     def widened(self, bound: float, floor: float) -> SetProbabilities:
