@@ -14,6 +14,7 @@ from scipy import integrate
 
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram, covariance_roots
+from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidences, log_evidences_beside
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause, scale_range
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from tests.gram_problem import LinearProblem
@@ -274,6 +275,23 @@ def test_evidence_for_many_scores_is_that_for_each():
         expected = [item.log_evidence(names) for item in each]
         np.testing.assert_allclose(evidence.log_evidences(names, scores), expected, atol=accuracy)
     assert (evidence.log_evidences([], scores) == 0.0).all()
+
+
+@pytest.mark.parametrize("size", [4, 120])
+def test_evidence_beside_a_set_is_that_of_the_gram_that_the_set_leaves(size):
+    """New eigenvectors where a group is small beside what was taken, an update of the old ones where it is large."""
+    rng = np.random.default_rng(22)
+    problem = LinearProblem.random(rng, {"a": 3, "b": size, "c": size}, samples=300)
+    problem.columns["b"][:, :2] += 3.0 * problem.columns["a"][:, :2]
+    problem = problem.observed(rng, {"a": np.array([1.0, -2.0, 0.5]), "b": np.full(size, 0.1)})
+    gram = problem.gram()
+    spread = np.linspace(1.0, 0.1, size)
+    groups = [AmplitudeGroup("b", 30.0, 1e-4), AmplitudeGroup("b", 30.0, 1e-4, spread), AmplitudeGroup("c", 30.0, 1e-4)]
+    columns, deviations = gram.groups["a"], np.array([0.1, 3.0, 1e4])
+    found = log_evidences_beside(GroupSpectrum.of(groups, gram), columns, deviations, gram)
+    expected = log_evidences(GroupSpectrum.of(groups, gram.conditioned(columns, deviations)))
+    np.testing.assert_allclose(found, expected, atol=0.03)  # other nodes of the scale
+    assert np.abs(found - log_evidences(GroupSpectrum.of(groups, gram))).max() > 1.0
 
 
 def test_scores_of_nothing_have_the_gram_as_their_covariance():

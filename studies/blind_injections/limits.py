@@ -19,7 +19,7 @@ from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
 
-DRAWS = 8  # number of simulated data sets from each of which the decision is taken
+DRAWS = 1  # simulated data sets of each trial, from each of which the decision is taken: the campaign has hundreds of trials
 
 
 @dataclass(frozen=True)

@@ -264,27 +264,31 @@ def log_nodes(whole: ScaleRange, part: tuple[float, float], values: Floats, thin
     return LogNodes(scales[0], log_weights[0])
 
 
-def log_nodes_of_many(ranges: Sequence[ScaleRange], values: Floats) -> tuple[Floats, Floats]:
-    """Return the scales and the logarithms of the weights of `log_nodes` over the whole ranges of groups of one size.
+def log_nodes_of_many(ranges: Sequence[ScaleRange], values: Floats) -> list[LogNodes]:
+    """Return `log_nodes` over the whole ranges of groups of one size.
 
     Parameters
     ----------
     ranges : sequence of ScaleRange
-        None of them a single scale.
     values : (n, k) array
         Eigenvalues of each group.
-
-    Returns
-    -------
-    scales, log_weights : (n, t) arrays
-        Rows with fewer nodes than others end with some of no weight.
     """
-    ends = np.array([(whole.low, whole.high) for whole in ranges])
-    return _nodes(ends, np.log(ends[:, 1] / ends[:, 0]), values, 1.0)
+    grids = [LogNodes(np.array([whole.high]), np.zeros(1)) for whole in ranges]
+    several = [place for place, whole in enumerate(ranges) if whole.low < whole.high]
+    if several:
+        ends = np.array([(ranges[place].low, ranges[place].high) for place in several])
+        rows = zip(*_nodes(ends, np.log(ends[:, 1] / ends[:, 0]), values[several], 1.0), strict=True)
+        for place, (scales, log_weights) in zip(several, rows, strict=True):
+            weighs = np.isfinite(log_weights)
+            grids[place] = LogNodes(scales[weighs], log_weights[weighs])
+    return grids
 
 
 def _nodes(ends: Floats, widths: Floats, values: Floats, thinned: float) -> tuple[Floats, Floats]:
-    """Return nodes between ends, (n, 2), of log-uniform priors of some widths, (n,)."""
+    """Return nodes between ends, (n, 2), of log-uniform priors of some widths, (n,).
+
+    Rows with fewer nodes than others end with some of no weight.
+    """
     first, last = np.log(ends).T
     logs = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, FINE)
     density = _density(logs, values)

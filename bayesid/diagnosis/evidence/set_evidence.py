@@ -9,29 +9,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 from scipy.special import logsumexp
 
-from bayesid._math.arrays import Floats, Integers, log_sum, log_sums
-from bayesid.diagnosis.evidence.gram import Gram, covariance_roots
+from bayesid._math.arrays import Floats, Integers, log_sum
+from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scale_integral import (
-    MOST_NODES,
     GroupSpectrum,
     ScaleAverage,
     average_over_scales,
     log_evidences,
+    log_evidences_beside,
+    log_evidences_of_scores,
 )
-from bayesid.diagnosis.evidence.scales import CandidateCause, thinning
+from bayesid.diagnosis.evidence.scales import CandidateCause
 
 __all__ = ["SetEvidence", "near_best"]
 
 FEW_COMBINATIONS = 8  # combinations of the forms of a set up to which all are integrated
 MOST_FORMS = 20  # forms of one cause that are weighed beside a set: those that do best by themselves
 FORMS_NEAR, MOST_NEAR = 4.0, 4  # nats below a cause's best form of those evaluated in full, and how many at most
-BLOCK = 4_000_000  # numbers in one intermediate array where many scores are evaluated at once
 
 _Forms = tuple[tuple[str, ...], tuple[int, ...]]  # causes, sorted, with a form of each
 
@@ -171,19 +171,34 @@ class SetEvidence:
         others, ordered = list(others), tuple(sorted(names))
         beside: _Forms = ordered, tuple(forms[name] for name in ordered)
         new = {name: self.ranked[name][:MOST_FORMS] for name in others if (beside, name) not in self._gains}
-        rest = self._left_by(ordered, forms, new) if ordered and new else self
-        for name, places in new.items():
-            values = rest.of_forms(name)
-            self._gains[beside, name] = dict(zip(places, values if ordered else values[list(places)], strict=True))
+        if ordered and new:
+            for name, gains in self._left_by(ordered, forms, new).items():
+                self._gains[beside, name] = gains
+        else:
+            for name, places in new.items():
+                self._gains[beside, name] = dict(zip(places, self.of_forms(name)[list(places)], strict=True))
         return {name: self._gains[beside, name] for name in others}
 
     def _left_by(
         self, names: Sequence[str], forms: Mapping[str, int], others: Mapping[str, Sequence[int]]
-    ) -> SetEvidence:
-        """Return the evidence of other causes, each in some of its forms, on what a set leaves them."""
-        causes = [self.causes[name].in_forms(places) for name, places in others.items()]
-        groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
-        return SetEvidence(self.beside(names, forms, groups), causes)
+    ) -> dict[str, dict[int, float]]:
+        """Return `of_forms` of other causes, each in some of its forms, on what a set leaves them."""
+        several = {name for name in others if self.causes[name].fixed or max(map(len, self._spectra[name])) > 1}
+        places = [(name, place) for name, some in others.items() if name not in several for place in some]
+        values: dict[str, dict[int, float]] = {name: {} for name in others}
+        if places:
+            gram = replace(self.gram, score=self.score_beside(names))
+            spectra = [self._spectra[name][place][0] for name, place in places]
+            each = log_evidences_beside(spectra, *self.most_probable(names, forms), gram)
+            for (name, place), value in zip(places, each.tolist(), strict=True):
+                values[name][place] = value + self.causes[name].variants[place].log_weight
+        if several:
+            causes = [self.causes[name].in_forms(others[name]) for name in sorted(several)]
+            groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
+            rest = SetEvidence(self.beside(names, forms, groups), causes)
+            for name in several:
+                values[name] = dict(zip(others[name], rest.of_forms(name), strict=True))
+        return values
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
         """Return the groups of a set, each by its cause and its place in that, in the order of the integration.
@@ -408,42 +423,7 @@ class SetEvidence:
         shifted, gain = self._with_fixed(ordered, scores)
         values = []
         for forms in self._choices(ordered):
-            chosen = dict(zip(ordered, forms, strict=True))
-            values.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
+            spectra = self.spectra(free, dict(zip(ordered, forms, strict=True)))
+            each = log_evidences_of_scores(spectra, self.gram, shifted)
+            values.append(each + self._log_weight(ordered, forms))
         return np.asarray(logsumexp(values, axis=0)) + gain
-
-    def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
-        """Return the log evidence of groups for many scores."""
-        if not spectra:
-            return np.zeros(len(scores))
-        if len(spectra) > 1:
-            return self._several(spectra, scores)
-        (spectrum,) = spectra
-        nodes = spectrum.nodes()
-        visible = nodes.scales[:, None] ** 2 * spectrum.values
-        squares = ((scores[:, spectrum.columns] * spectrum.root) @ spectrum.vectors) ** 2
-        share = nodes.scales[:, None] ** 2 / (1.0 + visible)
-        offset = nodes.log_weights - 0.5 * np.log1p(visible).sum(axis=1)
-        return log_sums(squares @ (0.5 * share).T + offset)
-
-    def _several(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
-        """Return the same for several groups, on the product of their nodes."""
-        thinned = thinning([len(spectrum.nodes().scales) for spectrum in spectra], MOST_NODES)
-        nodes = [spectrum.nodes(thinned) for spectrum in spectra]
-        scales = np.meshgrid(*(grid.scales for grid in nodes), indexing="ij")
-        log_weights = reduce(np.add.outer, (grid.log_weights for grid in nodes)).ravel()
-        columns = np.concatenate([spectrum.columns for spectrum in spectra])
-        deviations = np.concatenate(
-            [scale.reshape(-1, 1) * spectrum.root for scale, spectrum in zip(scales, spectra, strict=True)], axis=1
-        )
-        roots, half_log_det = covariance_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
-        covariance = np.swapaxes(roots, 1, 2) @ roots
-        upper = np.triu_indices(len(columns))
-        weights = 0.5 * covariance[:, upper[0], upper[1]] * np.where(upper[0] == upper[1], 1.0, 2.0)
-        log_evidence = np.empty(len(scores))
-        step = max(BLOCK // max(len(half_log_det), len(upper[0])), 1)
-        for start in range(0, len(scores), step):
-            part = scores[start : start + step][:, columns]
-            products = part[:, upper[0]] * part[:, upper[1]]
-            log_evidence[start : start + step] = log_sums(products @ weights.T + log_weights - half_log_det)
-        return log_evidence
