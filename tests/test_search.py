@@ -172,10 +172,9 @@ def test_a_richer_family_is_never_worse() -> None:
 
 
 @pytest.mark.usefixtures("slow")
-@pytest.mark.parametrize("name", ["four", "ets7"])
-def test_a_search_finds_what_three_descents_from_other_starts_find(name: str) -> None:
+def test_a_search_finds_what_three_descents_from_other_starts_find() -> None:
     """Within 2 % per parameter, the geometric mean of the standard deviations, all limits kept between the instants."""
-    own = search_problem(name)
+    own = search_problem("four")
     found = optimise(own, own.criteria[0], np.random.default_rng(0))
     assert all(item.kept for item in own.reached(found.parameters))
     rng, shared = np.random.default_rng(77), Shared(own)
