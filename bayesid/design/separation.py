@@ -34,7 +34,7 @@ class Separation(Criterion):
     Size and direction of the true one follow the prior that a diagnosis gives it (`RivalPrior`). All other unknowns
     are marginalised, and the readings are linear in amplitudes and unknowns about the prior's centre
     (`bayesid.design.decision_rate`). Earlier manoeuvres count with their readings averaged, as if these were still to
-    come. The model of the plan must contain the rivals.
+    come. In Python, the model of the plan must contain the rivals; the command adds them.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
 
-DRAWS = 1  # simulated data sets of each trial, from each of which the decision is taken: the campaign has hundreds of trials
+DRAWS = 1  # simulated data sets from which the decision is taken, in each of hundreds of trials
 
 
 @dataclass(frozen=True)

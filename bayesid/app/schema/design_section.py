@@ -39,7 +39,7 @@ class DesignLimits(Section):
     base_rotation : float, optional
         Largest rotation of the base relative to the start [rad].
     quiet_band : (2,), optional
-        Frequency band in which the motion must not excite the base [Hz].
+        Frequency band that may contain at most a thousandth of the power of the base's motion [Hz].
     """
 
     tip_speed: Positive | None = None

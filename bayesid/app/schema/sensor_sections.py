@@ -34,7 +34,7 @@ Arcseconds = Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more
 
 
 class SampledSensor(Section):
-    """Keys for readings of a sensor that were recorded differently from the format.
+    """Keys for a sensor whose recorded values have other axes, signs, units or columns than the format.
 
     Parameters
     ----------

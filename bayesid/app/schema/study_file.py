@@ -42,7 +42,7 @@ class Study(Section):
     telemetry : TelemetrySection, optional
         Times of the recordings, and use of the samples.
     joints : table of JointSection
-        Joints that were recorded differently from the robot's file, by name.
+        Joints whose recorded values have another sign, zero, unit or column than the robot's file, by name.
     recordings : sequence of RecordingSection
         Recordings; not required by commands that only design.
     unknowns : UnknownsSection

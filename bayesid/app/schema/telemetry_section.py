@@ -13,7 +13,7 @@ __all__ = ["JointSection", "TelemetrySection"]
 
 
 class JointSection(Section):
-    """Section ``[joints.JOINT]``, a joint that was recorded differently from the robot's file.
+    """Section ``[joints.JOINT]``, a joint whose recorded values differ in sign, zero, unit or column.
 
     Its position is ``sign * scale * reading + offset``.
 

@@ -46,8 +46,8 @@ class EncoderOffset(DisplacedMotion, OnJoint):
     name = "encoder-offset"
     summary = "The joint's encoder has a wrong zero: the posture of the arm differs from the recorded posture."
     separated_by = (
-        "It acts like a wrong posture: move that joint through a different range with the others still; the offset "
-        "remains constant, whereas an apparent mass error changes."
+        "The links are elsewhere than recorded: move that joint through a different range with the others still; the "
+        "offset remains constant, whereas an apparent mass error changes."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:

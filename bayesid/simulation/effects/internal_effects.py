@@ -75,7 +75,8 @@ FUEL = 0.3
 class WheelMomentum(Effect):
     """Residual momentum of reaction wheels at constant speed, in base axes.
 
-    The prior of 1 N m s is the capacity of a small wheel, more than the residual of an inactive attitude control.
+    The prior of 1 N m s is the capacity of a small wheel, more than usually remains in the wheels while attitude
+    control is off.
     """
 
     name = "wheel-momentum"

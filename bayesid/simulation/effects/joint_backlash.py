@@ -59,16 +59,18 @@ FINE = 20
 class JointBacklash(DisplacedMotion, OnJoint):
     """Play of a joint: the link is offset from the encoder, at one side of a gap, and occasionally crosses the gap.
 
-    One of two mechanisms presses it to a side. Without friction it is the torque through the joint: the flank that
-    drives the link pushes it from behind, so that it trails the encoder in the direction of its acceleration. When the
-    torque changes its sign, the link coasts from one flank to the other; the duration follows from the slope of the
-    torque and a gap of `TYPICAL_GAP`; the impact at the end is omitted. The torque is that of the robot's bodies, with
-    the centres of the priors for unknown ones. With friction, such as that of its bearing and cables, the link trails
-    in the direction of its motion. When the joint reverses, either the encoder moves on evenly and the link waits until
-    the gap is crossed, or the link moves on evenly and the encoder leaps while the friction changes its sign, which it
-    does with the speed of the link: the leap lasts as long as the link is slow. It has three parts, for three such
-    speeds (`CREEPING`), which allow for any friction, and the form that it has in the smoothed recording, which is
-    averaged over blocks and rings. In a gear with some friction, each mechanism contributes a part.
+    Its parameters are the offsets of three mechanisms:
+
+    - *coasting*, without friction: the flank that drives the link pushes it from behind, so that the link trails the
+      encoder in the direction of its acceleration. When the torque through the joint changes its sign, the link coasts
+      to the other flank; the duration follows from the slope of the torque and a gap of 1 mrad (or 1 mm). The impact at
+      the end is omitted. The torque is that of the robot's bodies, with the centres of the priors for unknown ones.
+    - *waiting*, with the friction of a bearing or cables: the link trails the encoder in the direction of its motion.
+      When the joint reverses, the link stands still until the gap is crossed.
+    - *leaping*, with friction, too: when the joint reverses, the link moves on evenly and the encoder crosses the gap
+      while the friction changes its sign, which takes longer, the slower the link is. Three parts, sharp, even
+      and soft, stand for three such speeds and allow for any friction. Their form is the one in the smoothed
+      recording.
     """
 
     name = "joint-backlash"

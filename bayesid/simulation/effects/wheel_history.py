@@ -38,7 +38,7 @@ class WheelHistory(Placed):
     The momentum is piecewise linear in time, with separate values in every recording. Its 24 values (knots) are
     equally spaced from the start of the recording to ``end``, by default ten seconds apart. It is constant after the
     last knot; the data do not determine knots after the end of a recording. The reaction torque on the base is minus
-    the slope of the momentum. For a momentum that is the same in all recordings, use `WheelMomentum`.
+    the slope of the momentum. For a momentum that is the same in all recordings, use `wheel-momentum`.
 
     The parameters are the momentum at the first knot and the torques of the motor between the knots, since a motor
     changes a momentum gradually: with independent torques the momentum is a random walk from any start. In a diagnosis
