@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import jax
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 from bayesid._io.errors import InputError
 from bayesid._math import memory
 from bayesid.app import command_line
+from bayesid.diagnosis import Rest, Status
 from bayesid.diagnosis.candidates.generic_cause import ERROR_WAVES, WAVES, course_groups, instants_of_each
 from bayesid.diagnosis.outcome.gain import FOLDS, folds_of
 from bayesid.diagnosis.settings import FULL
@@ -26,6 +28,8 @@ from bayesid.inference.perturbed_posterior import LinearResponses, Perturbation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import check_recordings
 from bayesid.simulation.effects import WheelHistory
+from studies.truth import hidden_causes
+from tests.hidden import diagnosed
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +81,18 @@ def test_courses_of_what_nobody_listed_stay_bounded(recordings: int) -> None:
         assert {r for _, chosen, _ in groups for r in chosen} == set(range(recordings))
         assert max(count for *_, count in groups) == WAVES == ERROR_WAVES
         assert recordings * instants_of_each(20, recordings) <= 20 * FULL + recordings
+
+
+@pytest.mark.slow
+def test_a_torque_that_nobody_listed_is_unknown_in_many_recordings(tmp_path: Path) -> None:
+    """From seven recordings on, a disturbance has quick courses in some of them and slow ones in all."""
+    (case,) = (case for case in hidden_causes.CASES if case.name == "growing-torque")
+    manoeuvres = {"count": FULL + 1, "duration": 40.0}
+    latitudes = [0.1 * number for number in range(FULL + 1)]
+    case = replace(case, fixed={**case.fixed, "manoeuvres": manoeuvres, "latitudes": latitudes})
+    result = diagnosed(case.make(tmp_path, 5, 6.0))
+    assert result.verdict.status is Status.UNKNOWN
+    assert result.remainder.verdict is Rest.PRESENT
 
 
 def test_every_recording_is_left_out_once() -> None:

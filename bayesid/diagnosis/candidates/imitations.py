@@ -48,13 +48,13 @@ def with_imitations(point: Linearisation, probabilities: SetProbabilities) -> Li
     directions: list[Signatures] = []
     unions: dict[str, tuple[str, ...]] = {}
     for cause in point.bank.causes:
-        group = cause.groups[0]
-        if cause.generic and group.spread is not None:
-            first = next(one for one in point.bank.signatures if one.name == group.name)
+        courses = {group.name for groups, _ in cause.variants for group in groups if group.spread is not None}
+        if cause.generic and courses:
+            first = next(one for one in point.bank.signatures if one.name in courses)
             sensor, name = _sensor(point.fit.posterior, first), f"directions of {cause.name}"
             like = [replace(one, name=name) for one, own in zip(linear, changed, strict=True) if own is sensor]
             directions += like
-            unions[f"{group.name}{SUFFIX}"] = (group.name, name) if like else (group.name,)
+            unions |= {f"{group}{SUFFIX}": (group, name) if like else (group,) for group in sorted(courses)}
     bank = replace(
         point.bank,
         signatures=(*point.bank.signatures, *directions),
