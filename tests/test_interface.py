@@ -88,7 +88,6 @@ def written(file: Path) -> dict:
     [
         ("predict", "prediction.json", {"seed": 4, "draws": 20}),
         ("identify", "identification.json", {"seed": 4, "effective_samples": 100.0}),
-        ("identifiability", "identifiability.json", {"seed": 4, "profiles": 0}),
     ],
 )
 def test_a_command_writes_what_its_function_returns(name, file, options, study, tmp_path):

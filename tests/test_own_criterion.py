@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_cli import run
-from test_design import plan as flywheel_plan
 from test_design_command import STUDY
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
 from bayesid.app.study_to_design import load_problem
 from bayesid.app.study_to_model import load_model
-from bayesid.design import Criterion, Limits, Problem, Search, known_criteria, optimise, register_criterion
+from bayesid.design import Criterion, known_criteria, register_criterion
 from tests.pdf_text import PdfText
 
 PLUGIN = '''
@@ -68,16 +67,6 @@ def test_a_plugin_adds_a_criterion_that_is_searched_with_and_reported(tmp_path):
     assert manoeuvre["criteria"]["turn"] == pytest.approx(-np.mean(angle**2), rel=0.02)  # on a finer grid
     assert np.abs(angle).max() > 0.01  # a random motion is improved on
     assert "which nobody but a test wants" in PdfText.read(tmp_path / "out" / "report.pdf")
-
-
-@pytest.mark.slow
-def test_a_search_follows_the_criterion_within_the_limits(tmp_path):
-    (axis,) = load_problem(Study.load(study(tmp_path))).criteria
-    problem = Problem(flywheel_plan(), Limits(joint_speed=0.2), (axis,))
-    found = optimise(problem, axis, np.random.default_rng(1), Search(starts=2, iterations=15))
-    # the wheel turns against its base, the farther the better: the speed of the only joint holds it back
-    assert {reached.name for reached in problem.reached(found.parameters) if reached.active} >= {"joint_speed"}
-    assert found.cost < problem.cost(axis, 0.5 * found.parameters)[0] < 0.0
 
 
 def test_a_criterion_that_is_unknown_or_made_wrongly_is_named_as_soon_as_a_model_is_read(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bayesid._math.least_squares import levenberg_marquardt
-from bayesid.diagnosis import Diagnosis, Rest, Status, diagnose
+from bayesid.diagnosis import Diagnosis, Status, diagnose
 from bayesid.inference.encoder_noise import first_rate_sd
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.blocks import BLOCKS_PER_SECOND
@@ -135,24 +135,21 @@ def assert_same(one: Diagnosis, other: Diagnosis) -> None:
         ({}, 0.0, 0.0),
         ({}, 0.0, 40.0),
         ({"rotor": WHEEL}, 0.0, 0.0),
-        ({"rotor": WHEEL}, 0.0, 40.0),
         ({}, LATE, 0.0),
         ({"appendages": [PANEL]}, 0.0, 0.0),
         ({"flexible": [mj.Flexibility("joint2", 2.0)]}, 0.0, 0.0),
     ],
-    ids=["nothing", "tone", "wheel", "wheel and tone", "late gyro", "panel at 0.9 Hz", "flexible joint"],
+    ids=["nothing", "tone", "wheel", "late gyro", "panel at 0.9 Hz", "flexible joint"],
 )
 def test_a_verdict_is_the_same_at_any_rate(hidden, late, tone):
     readings = toned(late_by(flown(**hidden), late), tone)
-    slow, *others = (diagnose(*study_at(readings, rate), 1) for rate in (10.0, 100.0, FINE))
+    slow, fast = (diagnose(*study_at(readings, rate), 1) for rate in (10.0, FINE))
     assert bool(slow.verdict.causes) == bool(hidden or late)
-    for fast in others:
-        assert_same(slow, fast)
+    assert_same(slow, fast)
 
 
-@pytest.mark.parametrize("hidden", [{"rotor": WHEEL}, {"appendages": [PANEL]}], ids=["wheel", "panel at 0.9 Hz"])
-def test_a_verdict_on_blocks_is_that_on_all_samples(hidden):
-    readings = flown(**hidden)
+def test_a_verdict_on_blocks_is_that_on_all_samples():
+    readings = flown(rotor=WHEEL)
     whole, reduced = (diagnose(*study_at(readings, 40.0, blocks), 1) for blocks in (0.0, BLOCKS_PER_SECOND))
     assert whole.verdict.causes
     assert_same(whole, reduced)
@@ -208,13 +205,3 @@ def test_fast_telemetry_without_a_cause_is_adequate(tmp_path):
     assert (
         diagnosed(fast_case("null", status="adequate", flown=0.05).make(tmp_path, 1)).verdict.status is Status.ADEQUATE
     )
-
-
-def test_a_mass_that_moves_for_seconds_is_no_adequate_model(tmp_path):
-    """A part moves by 15 mm in two seconds, a dozen standard deviations in all: the verdict was adequate.
-
-    No cause of the catalogue lasts as long, so that something unnamed is present, whatever is named beside it.
-    """
-    moved = diagnosed(fast_case("shifting-mass", hide.shifting_mass, status="unknown", flown=0.05).make(tmp_path, 1))
-    assert moved.verdict.status in (Status.UNKNOWN, Status.PARTLY_EXPLAINED)
-    assert moved.verdict.remainder.verdict is Rest.PRESENT

@@ -157,21 +157,6 @@ def test_a_richer_family_begins_where_the_poorer_one_ends(planar: Problem) -> No
 
 
 @pytest.mark.usefixtures("slow")
-def test_a_richer_family_is_never_worse() -> None:
-    base = search_problem("planar", duration=30.0)
-    search, best = Search(starts=4, iterations=20), None
-    costs = []
-    for harmonics in (2, 4):
-        family = Fourier(np.array([0.0, -0.6]), (0, 1), 30.0, harmonics)
-        own = Problem(replace(base.plan, family=family), base.limits, base.criteria)
-        first = () if best is None else [family.nearest(best)]
-        found = optimise(own, own.criteria[0], np.random.default_rng(5), search, first=first)
-        best = family.motion(found.parameters)
-        costs.append(found.cost)
-    assert costs[1] <= costs[0] + 1e-6
-
-
-@pytest.mark.usefixtures("slow")
 def test_a_search_finds_what_three_descents_from_other_starts_find() -> None:
     """Within 2 % per parameter, the geometric mean of the standard deviations, all limits kept between the instants."""
     own = search_problem("four")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
-from studies.benchmark.device import LAST, DeviceTimes, device_targets, search_seconds
+from studies.benchmark.device import LAST, DeviceTimes, device_targets
 from studies.benchmark.report import STUDY, figures_by_goal, goals_of
 from studies.benchmark.run import Benchmark, Result, Rival, Sampling, chain, posterior_of, seconds_per_evaluation
 from studies.common.study import Severity, Verdict
@@ -89,8 +89,3 @@ def test_figures_of_a_device_are_kept_with_their_date(tmp_path: Path):
     measured = DeviceTimes("made up", "2026-11-27", {12: 1e-3, 1024: 4e-6}, 3.0, 2.5)
     measured.write(tmp_path / "last.json")
     assert DeviceTimes.read(tmp_path / "last.json") == measured
-
-
-@pytest.mark.slow
-def test_a_search_from_many_starts_is_timed():
-    assert 0.0 < search_seconds(starts=3, iterations=2) < 300.0

@@ -130,7 +130,7 @@ def test_a_recording_without_noise_is_fitted_at_the_truth():
 
 @pytest.mark.usefixtures("slow")
 def test_the_whole_study_small(tmp_path):
-    result = run(seed=2, search=Search(starts=1, iterations=4), starts=4, repeats=4, random=8, points=2)
+    result = run(seed=2, search=Search(starts=1, iterations=4), starts=3, repeats=4, random=8, points=2)
     for name, item in result.contest.designs.items():
         assert all(reached.kept for reached in item.reached), name
     for row in mission.ROWS:
@@ -168,7 +168,7 @@ def test_the_whole_study_small(tmp_path):
 @pytest.mark.usefixtures("slow")
 def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(monkeypatch, tmp_path):
     monkeypatch.setattr("studies.excitation.search.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
-    store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(3, 10), Search(1, 10, exchanges=1))
+    store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(2, 4), Search(1, 4, exchanges=1))
     told: list[str] = []
     found = other_robots(1, *efforts, store, told.append)
     assert list(found) == ["a table"]

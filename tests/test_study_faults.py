@@ -40,11 +40,6 @@ def test_faults_around_a_run_get_one_clear_error(title):
 
 
 @pytest.mark.slow
-def test_a_cache_of_another_version_changes_nothing():
-    assert attempt({"cache": "another version"}, np.random.default_rng(0)) == {"same": True, "differs": True}
-
-
-@pytest.mark.slow
 def test_spoilt_files_are_counted():
     found = attempt({"spoil": 3, "changes": 20}, np.random.default_rng(0))
     assert sum(sum(counts.values()) for counts in found["answers"].values()) == 20

@@ -76,23 +76,17 @@ def test_bound_and_prior_are_those_of_a_wheel_and_of_its_motor():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("share", "strength", "seed", "status"), [(0.1, 0.6, 12, Status.AMBIGUOUS), (0.5, 1.0, 14, Status.EXPLAINED)]
-)
-def test_a_wheel_that_hardly_changes_is_the_most_probable_cause(share, strength, seed, status, tmp_path):
-    """It is charged for what it changes: with 24 independent values both were unknown, with 0.7 and more.
-
-    Beside a change of a tenth, with a signal-to-noise ratio of 10, a constant wheel with a drifting gyro does as well.
-    """
+def test_a_wheel_that_hardly_changes_is_named(tmp_path):
+    """It is charged for what it changes: with 24 independent values it was unknown, with 0.7."""
 
     def wandering(draw, strength):
-        levels = 0.02 * strength * (1.0 + share * np.concatenate([[0.0], np.cumsum(draw.uniform(-1.0, 1.0, 3))]))
+        levels = 0.02 * strength * (1.0 + 0.5 * np.concatenate([[0.0], np.cumsum(draw.uniform(-1.0, 1.0, 3))]))
         wheel = mj.SpunWheel(np.array([0.0, 0.0, 1.0]), np.array([0.0, 60.0, 120.0, 200.0]), levels)
         return {"hidden": mj.Hidden(fields=[wheel])}
 
-    verdict = diagnosed(hidden_case("wheel-history:z", wandering).make(tmp_path, seed, strength)).verdict
+    verdict = diagnosed(hidden_case("wheel-history:z", wandering).make(tmp_path, 14)).verdict
     assert verdict.causes == ("wheel-history:z",)
-    assert verdict.status is status
+    assert verdict.status is Status.EXPLAINED
 
 
 def test_it_needs_an_axis_and_a_length():

@@ -108,11 +108,6 @@ def compiled(tmp_path_factory) -> Callable[[bool], Posterior]:
     return get
 
 
-@pytest.mark.usefixtures("slow")
-def test_the_uncertainty_from_motion_alone_holds_the_truth(compiled, tmp_path):
-    check_distances(compiled(False), tmp_path)
-
-
 @pytest.mark.slow
 def test_the_uncertainty_from_motion_and_torques_holds_the_truth(compiled, tmp_path):
     check_distances(compiled(True), tmp_path)
