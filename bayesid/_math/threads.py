@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
@@ -42,8 +42,23 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> lis
     return list(each_in_threads(function, items))
 
 
-def each_in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Yield the results of `in_threads` one after another, each once it and those before it are there."""
+def each_in_threads(
+    function: Callable[[Item], Result], items: Iterable[Item], executor: Executor | None = None
+) -> Iterator[Result]:
+    """Yield the results of `in_threads` one after another, each once it and those before it are there.
+
+    Parameters
+    ----------
+    function : callable
+        Function of one argument, which an executor of other processes must be able to pickle.
+    items : iterable
+        Arguments.
+    executor : concurrent.futures.Executor, optional
+        Executor that computes them, instead of threads of this process.
+    """
+    if executor is not None:
+        yield from executor.map(function, items)
+        return
     items = list(items)
     count = min(len(items), _cores())
     if count < 2:

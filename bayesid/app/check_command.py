@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from bayesid._io.progress import Progress, part_of
 from bayesid._io.words import counted
-from bayesid.app.options import Output, StudyFile
+from bayesid.app.options import Output, Scheduler, StudyFile, executor_of
 
 __all__ = ["run"]
 
 
-def run(file: StudyFile, output: Output, progress: Progress) -> Iterator[str]:
+def run(file: StudyFile, output: Output, progress: Progress, scheduler: Scheduler = None) -> Iterator[str]:
     """Check a study and its recordings without a fit: check.json and report.pdf."""
     from bayesid.app.schema import Study
 
@@ -26,7 +26,8 @@ def run(file: StudyFile, output: Output, progress: Progress) -> Iterator[str]:
     from bayesid.report import check_report
 
     try:
-        result = check(study, progress=part_of(progress, 0.0, 0.5))
+        with executor_of(scheduler) as executor:
+            result = check(study, executor=executor, progress=part_of(progress, 0.0, 0.5))
     except ConventionError as error:  # so wrong that nothing else can be said
         conventions = [convention.to_dict() for convention in error.conventions]
         with complete_folder(output) as folder:

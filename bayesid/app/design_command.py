@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import nullcontext
 from dataclasses import replace
 from typing import Annotated
 
@@ -11,7 +10,7 @@ import typer
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
-from bayesid.app.options import Output, Scheduler, Seed, StudyFile, executor_at
+from bayesid.app.options import Output, Scheduler, Seed, StudyFile, executor_of
 
 __all__ = ["run"]
 
@@ -65,7 +64,7 @@ def run(
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)
         try:
-            with executor_at(scheduler) if scheduler else nullcontext() as executor:
+            with executor_of(scheduler) as executor:
                 result = design(
                     problem,
                     seed,

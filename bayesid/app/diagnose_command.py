@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from bayesid._io.progress import Progress, part_of, silent
-from bayesid.app.options import Output, Samples, Seed, StudyFile
+from bayesid.app.options import Output, Samples, Scheduler, Seed, StudyFile, executor_of
 
 if TYPE_CHECKING:
     from bayesid.app.schema import Study
@@ -26,12 +27,14 @@ def run(
     effective_samples: Samples = 4000.0,
     sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee after the verdict.")] = True,
     fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre if the verdict is undecided.")] = True,
+    scheduler: Scheduler = None,
 ) -> Iterator[str]:
     """Name the causes of a misfit of the simulation, add them to the model and measure the improvement."""
     from bayesid.app.schema import Study
 
     study, sampled = Study.load(file), effective_samples if sample else None
-    yield from diagnose_study(study, output, seed, sampled, progress, plan=fly_next)
+    with executor_of(scheduler) as executor:
+        yield from diagnose_study(study, output, seed, sampled, progress, plan=fly_next, executor=executor)
 
 
 def diagnose_study(
@@ -42,6 +45,7 @@ def diagnose_study(
     progress: Progress = silent,
     keep: Callable[[Diagnosis], object] = lambda result: None,
     plan: bool = False,
+    executor: Executor | None = None,
 ) -> Iterator[str]:
     """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
 
@@ -63,6 +67,8 @@ def diagnose_study(
         Function that receives the diagnosis.
     plan : bool
         Whether to design the manoeuvre that would resolve an undecided verdict.
+    executor : concurrent.futures.Executor, optional
+        As for `bayesid.diagnose`.
 
     Yields
     ------
@@ -90,7 +96,7 @@ def diagnose_study(
     with claimed_folder(output):
         whole = part_of(progress, 0.0, VERDICT) if sample else progress
         try:
-            result = diagnose(study, seed=seed, sample=False, fly_next=False, progress=whole)
+            result = diagnose(study, seed=seed, sample=False, fly_next=False, executor=executor, progress=whole)
         except ConventionError as error:
             with complete_folder(output) as folder:
                 write_json(folder / "diagnosis.json", convention_verdict(error.conventions))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from bayesid._io.progress import Progress, part_of
-from bayesid.app.options import Output, Samples, Seed, StudyFile
+from bayesid.app.options import Output, Samples, Scheduler, Seed, StudyFile, executor_of
 
 if TYPE_CHECKING:
     from bayesid.inference import Identification
@@ -15,7 +15,12 @@ __all__ = ["run"]
 
 
 def run(
-    file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, effective_samples: Samples = 4000.0
+    file: StudyFile,
+    output: Output,
+    progress: Progress,
+    seed: Seed = 0,
+    effective_samples: Samples = 4000.0,
+    scheduler: Scheduler = None,
 ) -> Iterator[str]:
     """Compute the posterior distribution of the inertial parameters of the unknown bodies."""
     from bayesid.app.schema import Study
@@ -35,7 +40,8 @@ def run(
     from bayesid.report import identification_report
 
     clock = PhaseClock()
-    posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
+    with executor_of(scheduler) as executor:
+        posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05), executor=executor)
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
     yield from open_places(study)
     clock.ends("load")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -60,7 +62,12 @@ FARTHEST = 10.0
 CHANGE_SEED = 0  # seed of the draws of an uncertain mass-property change, so that a study always has the same prior
 
 
-def load_posterior(study: Study | str | Path, window: int | None = None, progress: Progress = silent) -> Posterior:
+def load_posterior(
+    study: Study | str | Path,
+    window: int | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> Posterior:
     """Read all files that a study names, and return its posterior.
 
     Parameters
@@ -70,6 +77,8 @@ def load_posterior(study: Study | str | Path, window: int | None = None, progres
         As for `Posterior.of`.
     progress : Progress, optional
         Receiver of the share of the recordings that is read.
+    executor : concurrent.futures.Executor, optional
+        As for `load_manoeuvres`.
 
     Raises
     ------
@@ -78,7 +87,7 @@ def load_posterior(study: Study | str | Path, window: int | None = None, progres
     """
     study = Study.of(study)
     model = load_model(study)
-    manoeuvres = load_manoeuvres(study, model.robot, progress)
+    manoeuvres = load_manoeuvres(study, model.robot, progress, executor)
     try:
         refuse_conventions(model, manoeuvres)
     except ConventionError as error:
@@ -193,7 +202,9 @@ def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tup
 
 
 @threadpool_limits.wrap(limits=1)  # sums of several threads are slower here, and rounded by chance
-def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress = silent) -> list[Manoeuvre]:
+def load_manoeuvres(
+    study: Study | str | Path, robot: Robot, progress: Progress = silent, executor: Executor | None = None
+) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion.
 
     Parameters
@@ -202,6 +213,9 @@ def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress 
     robot : Robot
     progress : Progress, optional
         Receiver of the share that is read.
+    executor : concurrent.futures.Executor, optional
+        Executor whose workers read one recording each, instead of threads of this process; they find the files at the
+        same paths.
     """
     study = Study.of(study)
     if not study.recordings:
@@ -210,7 +224,7 @@ def load_manoeuvres(study: Study | str | Path, robot: Robot, progress: Progress 
     manoeuvres: list[Manoeuvre] = []
     count = len(study.recordings)
     progress(0.0, "reading the recordings and smoothing the joints' motion")
-    for manoeuvre in each_in_threads(lambda section: _load_manoeuvre(study, section, robot), study.recordings):
+    for manoeuvre in each_in_threads(partial(_load_manoeuvre, study, robot), study.recordings, executor):
         manoeuvres.append(manoeuvre)
         progress(len(manoeuvres) / count, f"recording {len(manoeuvres)} of {count} read, joint motion smoothed")
     _refuse_copies(study, manoeuvres)
@@ -248,7 +262,7 @@ def _check_latitudes(study: Study) -> None:
             )
 
 
-def _load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
+def _load_manoeuvre(study: Study, robot: Robot, section: RecordingSection) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = unwrapped(Recording.read(section.file, recorded_as(study, section, robot)), robot)
     check_wheels(recording, robot.wheels)

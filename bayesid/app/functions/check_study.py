@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -63,12 +64,16 @@ class StudyCheck(ShortForm):
 
 
 @threadpool_limits.wrap(limits=1)  # sums of several threads are slower here, and rounded by chance
-def check(study: StudySource | Posterior, *, progress: Progress = silent) -> StudyCheck:
+def check(
+    study: StudySource | Posterior, *, executor: Executor | None = None, progress: Progress = silent
+) -> StudyCheck:
     """Check a study and its recordings: rates, gaps, noise, clocks, and joints that hardly move.
 
     Parameters
     ----------
     study : path, Study or Posterior
+    executor : concurrent.futures.Executor, optional
+        Executor whose workers read one recording each.
     progress : Progress, optional
 
     Raises
@@ -81,7 +86,7 @@ def check(study: StudySource | Posterior, *, progress: Progress = silent) -> Stu
         posterior, conventions = study, find_conventions(study.model, study.manoeuvres)
     else:
         model = load_model(study)
-        manoeuvres = load_manoeuvres(study, model.robot, part_of(progress, 0.0, 0.7))
+        manoeuvres = load_manoeuvres(study, model.robot, part_of(progress, 0.0, 0.7), executor)
         conventions = find_conventions(model, manoeuvres)
         # nothing is fitted: the samples' correlations do not matter
         posterior = Posterior.of(model, manoeuvres, window=0)

@@ -69,7 +69,7 @@ def diagnose(
     knows_latitude : bool
         Whether the arguments of latitude of a model's manoeuvres are known; for a study, whether it gives all of them.
     executor : concurrent.futures.Executor, optional
-        Executor of the refits that omit one recording each.
+        Executor whose workers read one recording each, and refit with one recording omitted.
     progress : Progress, optional
         Receiver of the fraction done.
 
@@ -85,7 +85,8 @@ def diagnose(
         whole = study_of(study)
         model = load_model(whole)
         reading = part_of(progress, 0.0, 0.05)
-        manoeuvres = load_manoeuvres(whole, model.robot, reading) if manoeuvres is None else manoeuvres
+        if manoeuvres is None:
+            manoeuvres = load_manoeuvres(whole, model.robot, reading, executor)
         knows_latitude = all(section.argument_of_latitude is not None for section in whole.recordings)
         bounds, prior = bounds or stated_bounds(whole), prior or cause_prior(whole)
     result = diagnose_motion(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from pathlib import Path
 
 from emcee.backends import HDFBackend
@@ -28,6 +29,7 @@ def identify(
     sampler: Sampler | None = None,
     max_steps: int = 5000,
     file: str | Path | HDFBackend | None = None,
+    executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Identification:
     """Identify the unknown bodies and effects by their posterior.
@@ -47,6 +49,8 @@ def identify(
         Maximum number of steps per emcee ensemble.
     file : path or emcee.backends.HDFBackend, optional
         File in which emcee stores every step; an interrupted run resumes from it.
+    executor : concurrent.futures.Executor, optional
+        Executor whose workers read one recording each.
     progress : Progress, optional
         Receiver of the fraction done.
 
@@ -55,7 +59,7 @@ def identify(
     InputError
         If the study is invalid, nothing is unknown, nothing moves, or no values of the unknowns fit the data.
     """
-    posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05))
+    posterior = recorded_posterior(study, progress=part_of(progress, 0.0, 0.05), executor=executor)
     if not posterior.size:
         raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
     refuse_no_motion(posterior)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from pathlib import Path
 
 from bayesid._io.progress import Progress, silent
@@ -22,7 +23,10 @@ def study_of(source: StudySource) -> Study:
 
 
 def recorded_posterior(
-    source: StudySource | Posterior, window: int | None = None, progress: Progress = silent
+    source: StudySource | Posterior,
+    window: int | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
 ) -> Posterior:
     """Return the posterior of a study's recordings, whose units are checked; a posterior is returned as it is.
 
@@ -33,9 +37,11 @@ def recorded_posterior(
         As for `Posterior.of`.
     progress : Progress, optional
         Receiver of the share of the recordings that is read.
+    executor : concurrent.futures.Executor, optional
+        As for `load_manoeuvres`.
     """
     if isinstance(source, Posterior):
         return source
-    posterior = load_posterior(study_of(source), window, progress)
+    posterior = load_posterior(study_of(source), window, progress, executor)
     refuse_wrong_units(posterior)
     return posterior
