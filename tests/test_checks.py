@@ -24,6 +24,7 @@ from bayesid import (
 )
 from bayesid.inference.predicted_readings import simulate_manoeuvre
 from bayesid.inference.recording_check import check_recording
+from bayesid.report.figures import channel_spectra
 
 SIGMA = 1e-5
 TIME = np.arange(0.0, 140.01, 0.5)  # at rest from 100 s
@@ -112,3 +113,11 @@ def test_paths_of_the_repository_hold_no_measurements() -> None:
         item.name for folder in ("bayesid", "studies", "tests", "reports") for item in (root / folder).rglob("*.csv")
     }
     assert not {name for name in names if "LOG" in name}
+
+
+def test_the_frequencies_of_a_wheel_are_shaded_where_spectra_have_them(model: Model, recording: Recording) -> None:
+    spectra = check(model, recording).spectra
+    last = float(spectra[0].frequency[-1])
+    for rotation, shaded in (((0.3 * last, 2.0 * last), 1), ((3.0 * last, 4.0 * last), 0)):
+        for axes in channel_spectra(spectra, [rotation]).axes:
+            assert len(axes.patches) == shaded

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.recording_check import RecordingCheck
 from bayesid.recording.convention import Convention
+from bayesid.recording.recording import WHEEL_SPEED, Recording
 from bayesid.report import figures
 from bayesid.report.convention_report import add_conventions
 from bayesid.report.document import Document
@@ -125,10 +127,13 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             "Channels that are averaged over blocks before the fit, and their content above the block rate.",
         )
     if check.spectra:
+        last = max(float(spectrum.frequency[-1]) for spectrum in check.spectra)
+        rotations = [each for each in _rotations(posterior.manoeuvres[index].recording) if each[0] < last]
+        shaded = " The frequencies at which the recorded wheels rotate are shaded." if rotations else ""
         document.figure(
-            figures.channel_spectra(check.spectra),
+            figures.channel_spectra(check.spectra, rotations),
             "Amplitude spectral density of each channel, in its unit per root hertz. If samples are averaged over "
-            "blocks, the solid line marks the block rate; dotted lines mark tones above it.",
+            f"blocks, the solid line marks the block rate; dotted lines mark tones above it.{shaded}",
         )
     document.table(
         ["sensor", "unit", "declared sigma:", "sigma in quiet periods:", "delay relative to the joints [s]:"],
@@ -174,6 +179,12 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             "unit per s, per s²].",
         )
         document.figure(figures.plot_manoeuvre(posterior, index), "Motion of the joints.")
+
+
+def _rotations(recording: Recording) -> list[tuple[float, float]]:
+    """Return the lowest and the highest frequency of rotation of each wheel [Hz]."""
+    speeds = [np.abs(recording.series(f"{WHEEL_SPEED}.{name}")[1]) for name in recording.wheels]
+    return [(float(each.min()) / math.tau, float(each.max()) / math.tau) for each in speeds]
 
 
 def _by_axis(values: Sequence[float] | np.ndarray) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 from scipy import stats
 
 from bayesid._math.arrays import Floats
@@ -67,8 +67,15 @@ class Curves(NamedTuple):
 
 
 @styled
-def channel_spectra(spectra: Sequence[ChannelSpectrum]) -> Figure:
-    """Draw the amplitude spectral density of each channel; what is right of the line is above the blocks' rate."""
+def channel_spectra(spectra: Sequence[ChannelSpectrum], rotations: Sequence[tuple[float, float]] = ()) -> Figure:
+    """Draw the amplitude spectral density of each channel; what is right of the line is above the blocks' rate.
+
+    Parameters
+    ----------
+    spectra : sequence of ChannelSpectrum
+    rotations : sequence of pairs of float
+        Lowest and highest frequency of rotation of each recorded wheel [Hz], which are shaded.
+    """
     rows = -(-len(spectra) // COLUMNS)
     figure = wide_figure(1.3 * rows + 0.2)
     for place, spectrum in enumerate(spectra):
@@ -78,6 +85,13 @@ def channel_spectra(spectra: Sequence[ChannelSpectrum]) -> Figure:
             axes.axvline(spectrum.block_rate, color=COLOURS[1], linewidth=0.8)
         for line in spectrum.tones:
             axes.axvline(line.frequency, color=COLOURS[1], linewidth=0.6, linestyle=":")
+        first, last = spectrum.frequency[0], spectrum.frequency[-1]
+        for low, high in rotations:
+            if low <= last and high >= first:
+                axes.axvspan(max(low, first), min(high, last), color=COLOURS[2], alpha=0.25, linewidth=0.0)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if last > 30.0 * first else (1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda frequency, _: f"{frequency:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         title_panel(axes, spectrum.name)
         if place >= len(spectra) - COLUMNS:
             axes.set_xlabel("Hz")
