@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bayesid._io.files import write_text
+from bayesid._io.words import first_sentence
 from studies.common.study import NOT_FULL, Verdict
 from studies.validation import BESIDE, severities
 
@@ -62,7 +63,8 @@ def _entry(file: Path, summary: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield summary["question"]
     yield ""
-    yield f"**{summary['answer']}**"
+    headline, rest = first_sentence(summary["answer"])
+    yield f"**{headline}** {rest}".rstrip()
     yield ""
     caution = "" if summary["full"] else f"{NOT_FULL} "
     yield f"Valid when {summary['valid']} {caution}Goals: {_counts(summary['goals'])}."

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from bayesid._io.words import first_sentence
 from studies.manual.content import content
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -95,3 +96,15 @@ def test_prose_is_plain_english(name):
     text = re.sub(r"```.*?```", "", (ROOT / name).read_text(encoding="utf-8"), flags=re.DOTALL)
     text = "\n".join(line for line in text.splitlines() if not line.startswith(("    ", "#let", "#show", "//")))
     assert refused(text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "split"),
+    [
+        ("It is 0.5 m (1 sigma). With 3 it is more. So.", ("It is 0.5 m (1 sigma).", "With 3 it is more. So.")),
+        ("58 of 63 are inside. 4 of 4 are named.", ("58 of 63 are inside.", "4 of 4 are named.")),
+        ("Decision. Explained: payload", ("Decision. Explained: payload", "")),
+    ],
+)
+def test_the_first_sentence_is_the_headline(text, split):
+    assert first_sentence(text) == split

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 
-__all__ = ["abridged", "counted", "joined", "ordinal"]
+__all__ = ["abridged", "counted", "first_sentence", "joined", "ordinal"]
 
 NAMED = 8  # number of texts that an abridged list names by default
 
@@ -46,3 +47,9 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
 def ordinal(number: int) -> str:
     """Return the ordinal of a number that counts from one: ``first``, ``second``, ``third``, ``4th``."""
     return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def first_sentence(text: str) -> tuple[str, str]:
+    """Return the first sentence of a text, of two words or more, and the rest, which starts with a capital or digit."""
+    parts = re.match(r"(\S+ .*?[.!?]) ([A-Z0-9].*)", text, re.DOTALL)
+    return (parts[1], parts[2]) if parts else (text, "")

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
+from bayesid._io.words import first_sentence
 from bayesid._math.threads import in_threads
 from bayesid.report.vector_figure import VectorFigure
 
@@ -107,10 +108,14 @@ class Document:
             self._parts.append(f"#list({', '.join(entries)})\n")
 
     def decision(self, title: str, entries: Sequence[tuple[str, str]], picture: Figure | None = None) -> None:
-        """Add a framed box with a title, rows of a name and its text, and a picture next to them in its true size."""
+        """Add a framed box with a title, rows of a name and its text, and a picture next to them in its true size.
+
+        The first sentence of the title is in bold; what follows is read as its explanation.
+        """
         cells = "".join(f", {literal(text)}" for entry in entries for text in entry)
         image = "none" if picture is None else f"image({self._image(picture)})"
-        self._parts.append(f"#decision({literal(title)}, {image}{cells})\n")
+        headline, rest = first_sentence(title)
+        self._parts.append(f"#decision({literal(headline)}, {literal(rest)}, {image}{cells})\n")
 
     def mentions(self, pattern: str) -> bool:
         """Whether a regular expression occurs in the content added so far, except in figures."""

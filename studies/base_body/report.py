@@ -35,9 +35,9 @@ def _report(result: BaseBody) -> Report[BaseBody]:
         question="How well does one manoeuvre of the arm determine mass, centre of mass and inertia of the base, with "
         "realistic sensors, at the speed that the flight rule permits?",
         answer="One manoeuvre at the permitted speed determines the base's mass to "
-        f"{format_percent(permitted[MASS], 2)} (1 sigma, to first order) if the arm is known exactly, and to "
-        f"{format_percent(known[MASS], 2)} if the arm is uncertain by 5 % (1 sigma). Flown "
-        f"{format_fixed(result.slowness, 1)} times faster, the exact arm gives {format_percent(faster[MASS], 2)}. "
+        f"{format_percent(known[MASS], 2)} with an arm uncertain by 5 %. With the arm known exactly it is "
+        f"{format_percent(permitted[MASS], 2)}, and {format_percent(faster[MASS], 2)} flown "
+        f"{format_fixed(result.slowness, 1)} times faster. All are 1 sigma, to first order. "
         f"Data: one recording of {slow.duration:.0f} s at 2 Hz, with a star tracker of 2″ and an accelerometer of "
         f"{format_number(GRADES[0])} m/s² per sample. With an uncertain arm no better sensor of motion helps, but "
         f"{WAY_OUT}.",

@@ -152,9 +152,9 @@ def _report(result: Result) -> Report[Result]:
         "numbers do motion and joint torques determine, and what fixes the scale of the masses, which motion alone "
         "does not determine?",
         answer=f"Motion and joint torques determine {arm.count} sums of the {len(arm.standard)} inertial parameters of "
-        f"ETS-VII, and {planar.count} of {len(planar.standard)} with two joints. Motion alone does not determine the "
-        "scale of all masses; the gravity gradient does not provide it either, but one known body, torque or thrust "
-        "does.",
+        f"ETS-VII. With two joints they determine {planar.count} of {len(planar.standard)}. Motion alone does not "
+        "determine the scale of all masses; the gravity gradient does not provide it either, but one known body, "
+        "torque or thrust does.",
         goals=goals_of(result),
         valid="bodies are rigid and joints ideal, without friction and rotors. How well a manoeuvre with noisy sensors "
         "determines each sum is a separate question, which the posterior answers.",

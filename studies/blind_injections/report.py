@@ -66,13 +66,14 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     answer = (
         f"{share_text(right, len(sure))} verdicts with a probability of {SURE:g} or more on a hidden cause of the "
-        f"catalogue name no false cause, {share_text(sum(map(surely_misnamed, outside)), len(outside))} effects from "
-        f"outside it were named so, and {share_text(alarmed, len(nulls))} trials with nothing hidden raised an alarm"
+        f"catalogue name no false cause. {share_text(sum(map(surely_misnamed, outside)), len(outside))} effects from "
+        f"outside it were named with such a probability, and {share_text(alarmed, len(nulls))} trials with nothing "
+        "hidden raised an alarm."
     )
     if len(trials) < planned:
         answer += (
-            f"; with {len(trials):,} of {planned:,} planned trials {verdicts.count(Verdict.OPEN)} of {len(judged)} "
-            "goals are undecided"
+            f" With {len(trials):,} of {planned:,} planned trials, {verdicts.count(Verdict.OPEN)} of {len(judged)} "
+            "goals are undecided."
         )
     seconds = np.median([trial.seconds["total"] for trial in trials])
     return Report(
@@ -80,7 +81,7 @@ def _report(campaign: Campaign) -> Report[Campaign]:
         subtitle="Verdicts of the diagnosis on hidden causes",
         question="How often does the diagnosis name a hidden cause, correctly or wrongly, and how often does it raise "
         "an alarm with nothing hidden?",
-        answer=f"{answer}.",
+        answer=answer,
         goals=judged,
         valid="a base carries an arm of three to five joints whose links are exact or have a relative uncertainty of "
         "2 %, and noise is white and as declared unless a noise fault is hidden.",

@@ -159,14 +159,14 @@ def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
     made, planned = sum(len(runs.results) for runs in cases), sum(REPLICATES.values())
     share, error = pooled_coverage([runs.bodies() for runs in cases if runs.results], LEVELS[-1])
     wrong = [p for p in corrected.values() if p <= FAMILYWISE]
-    said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
+    said = f"{len(wrong)} ranks contradict uniformity" if wrong else "No rank contradicts uniformity"
     return Report(
         title="Calibration",
         subtitle="Coverage of the posterior's intervals",
         question="Does the truth lie within the stated intervals as often as stated, through the whole chain?",
         answer=f"{_percent(share, error)} % of the bodies' true values lie within their {format_percent(LEVELS[-1])} "
-        f"intervals, and {said}, over {made:,} replicates"
-        + (f" of the {planned:,} needed for a decision." if made < planned else "."),
+        f"intervals ({made:,} replicates). {said}."
+        + (f" A decision needs {planned:,} replicates." if made < planned else ""),
         goals=goals_of(cases),
         valid="noise is white and as declared, joints move smoothly, the model lacks no effect, and the truths are "
         "drawn from the prior.",

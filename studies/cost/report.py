@@ -139,7 +139,8 @@ def _report(cost: Cost) -> Report[Cost]:
         question="How long do commands take from files to answers, with and without cached compiled code, how much "
         "memory do they need, and how does that grow with the problem?",
         answer=f"A diagnosis of three recordings reaches its verdict in {warm[quickest]:.1f} s ({quickest}) to "
-        f"{warm[slowest]:.1f} s ({slowest}), with the whole catalogue and cached compiled code.{_limits_text(warm)} "
+        f"{warm[slowest]:.1f} s ({slowest}). It evaluates the whole catalogue with cached compiled "
+        f"code.{_limits_text(warm)} "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
         goals=goals,
         valid=f"run on {processor()}, two cores, with no other load. The machine's speed varies by a third from day to "

@@ -8,6 +8,7 @@ from dataclasses import astuple, fields
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid._io.words import joined
 from bayesid.report import Document, figures, format_quantity
 from bayesid.report.diagnosis.cause_words import set_text
 from bayesid.report.figures.figure_style import AFTER, BAND, BEFORE, TRUTH, shared_legend, styled, wide_figure
@@ -50,7 +51,7 @@ def _report(cases: Cases) -> Report[Cases]:
         question="With attitude control off, the attitude of ETS-VII drifted away from its simulation (the paper's "
         "figure 2). Can the causes be named from rates and joints alone, with a base uncertain by 5 % (1 sigma), and "
         "does the simulation with them predict the measured attitude, which was not used?",
-        answer=" ".join(_answer(name, case) for name, case in cases.items()),
+        answer=_answer(cases),
         valid="the links are known exactly (in the paper only to 5 %), the wheels' momentum is constant and the noise "
         "is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
         goals=goals_of(cases),
@@ -100,19 +101,29 @@ def _shown(cases: Cases) -> tuple[str, Case]:
     return (right or list(cases.items()))[0]
 
 
-def _answer(known: str, case: Case) -> str:
-    """Return what is said and predicted with the base known to so much."""
-    before, after = (format_number(_rms(case, name), 2) for name in ("plain", "extended"))
-    text = f"With a base uncertain by {known} (1 sigma) the diagnosis "
-    if case.right:
-        text += "names exactly the three true causes"
-    elif case.diagnosis.verdict.causes:
-        text += f"is wrong or incomplete ({', '.join(case.diagnosis.verdict.causes)})"
+def _answer(cases: Cases) -> str:
+    """Return what is said and predicted with each uncertainty of the base."""
+    if all(case.right for case in cases.values()):
+        said = ["The diagnosis names exactly the three true causes of the drift."]
     else:
-        text += f"names nothing (verdict: {case.diagnosis.verdict.status.value})"
-    if not case.diagnosis.verdict.causes:
-        return f"{text}, and {ANGLE} stays at {before} degrees."
-    return f"{text}; {ANGLE} is {after} degrees with these causes, and {before} without them."
+        said = [
+            f"The diagnosis names {_named(case)} with a base uncertain by {known}." for known, case in cases.items()
+        ]
+    for known, case in cases.items():
+        before, after = (format_number(_rms(case, name), 2) for name in ("plain", "extended"))
+        angle = f"With a base uncertain by {known} (1 sigma), {ANGLE}"
+        named = bool(case.diagnosis.verdict.causes)
+        said.append(
+            f"{angle} falls from {before} to {after} degrees." if named else f"{angle} stays at {before} degrees."
+        )
+    return " ".join(said)
+
+
+def _named(case: Case) -> str:
+    if case.right:
+        return "exactly the three true causes"
+    verdict = case.diagnosis.verdict
+    return f"{joined(verdict.causes)}, which is wrong or incomplete," if verdict.causes else "nothing"
 
 
 def _rms(case: Case, name: str) -> float:

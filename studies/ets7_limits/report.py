@@ -69,7 +69,7 @@ def _report(result: Result) -> Report[Result]:
         question="How long must the arm move within the flight rule until mass and moments of inertia of the base "
         "are determined to 1 %, and with which sensors?",
         answer=f"At least {format_percent(_least(result), 2)} uncertainty remains with an arm uncertain by 5 % (1 "
-        "sigma), whatever the time, rate sensor and accelerometer: motion alone takes the scale from the arm's mass; "
+        "sigma), whatever the time, rate sensor and accelerometer. Motion alone takes the scale from the arm's mass; "
         "measured joint torques or a known thrust would provide it. With the arm known exactly one manoeuvre of "
         f"{mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with sensors of "
         "10⁻⁵ rad/s and 10⁻⁵ m/s².",

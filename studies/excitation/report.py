@@ -234,9 +234,9 @@ def _report(result: Result) -> Report[Result]:
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
         answer=f"The d-optimal manoeuvre gives {factors[HEADLINE]:.2f} times smaller standard deviations of the base "
-        f"(geometric mean) than the best condition number, with the {ARMS[HEADLINE]}. That of the mass alone, whose "
-        f"scale comes from the arm, is {_of_mass(contest):.2f} times smaller. With the {ARMS[IDEAL]} the geometric "
-        f"mean is {factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
+        f"than the best condition number. That is their geometric mean, with the {ARMS[HEADLINE]}. That of the mass "
+        f"alone, whose scale comes from the arm, is {_of_mass(contest):.2f} times smaller. With the {ARMS[IDEAL]} the "
+        f"geometric mean is {factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
         "gradient acts.",

@@ -58,8 +58,8 @@ def _report(result: Result) -> Report[Result]:
         subtitle="Problem 3 of Lampariello and Hirzinger (IDETC 2005)",
         question="ETS-VII carries a load of 120 kg, and the inertial parameters of all bodies are uncertain. What does "
         "one manoeuvre determine, with which sensors, and what must be known in advance?",
-        answer=f"With joint torques, the mass of the whole system has a standard deviation of {torques}, with a known "
-        f"thrust {thrust}. With motion alone it is {motion}: motion determines ratios of masses, and only the drawings "
+        answer=f"With joint torques, the mass of the whole system has a standard deviation of {torques}. With a known "
+        f"thrust it is {thrust}, with motion alone {motion}: motion determines ratios of masses, and only the drawings "
         f"give their scale. Data: one recording of {result.duration:g} s at 2 Hz, with noise per sample of "
         f"{format_number(RATE)} rad/s, {format_number(ACCEL)} m/s² and {format_number(TORQUE)} N m (torques); the "
         f"manoeuvre moves the tip {haste}.",
