@@ -28,7 +28,7 @@ Floors = tuple[tuple[tuple[float, ...], ...], ...]
 @register_criterion
 @dataclass(frozen=True)
 class Separation(Criterion):
-    """Expected probability of a decision between rival effects, for the rival that is decided least often.
+    """Expected probability that the true one of rival effects is identified, for the one identified least often.
 
     A decision gives the true rival a probability of 0.9 or more against the others, all equally probable beforehand.
     Size and direction of the true one follow the prior that a diagnosis gives it (`RivalPrior`). All other unknowns
@@ -49,8 +49,8 @@ class Separation(Criterion):
     name = "separation"
     meaning = (
         "The largest expected probability that the readings give the true one of the rival effects a probability of "
-        "0.9 or more, for the rival that is decided least often. Size and direction of a rival follow the prior that a "
-        "diagnosis gives it, and all other quantities are unknown. The cost is minus ten times that probability, with "
+        "0.9 or more, for the one that is identified least often. Size and direction of a rival follow the prior that "
+        "a diagnosis gives it; all other quantities are unknown. The cost is minus ten times that probability, with "
         "smooth steps of half a nat at the decisions."
     )
     compares_rivals = True

@@ -116,9 +116,9 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
         ],
         candidate_rows(result.candidates, result.alarm.level),
         f"All {len(result.candidates)} candidates, each added alone to the present model, in the linear approximation. "
-        "The probability is that of being present, alone or with other causes. Candidates that stand out have a size; "
-        "the magnitudes of the others lie below the given limits with 95 % probability. Empty cells were not "
-        "evaluated.",
+        "The probability is that of being present, alone or with other causes. Sizes, of candidates that stand out, "
+        "and 95 % limits, of the others, apply only if the candidate is the only cause: they are no measurements in "
+        "addition to a named cause. Empty cells were not evaluated.",
     )
 
 

@@ -37,14 +37,14 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         f"{len(result.probabilities.sets)} weighed: single causes, and sets of up to three that extend a probable one. "
         "The log evidence is relative to that of no cause. Sizes are "
         "root mean squares of the amplitudes that share a unit, from the linear model at the most probable scale; a "
-        "size beyond its bound is implausible. For a missing or sloshing body, the mass represents all its moments.",
+        "size beyond its bound is implausible. Of a missing or sloshing body, only the mass is shown.",
     )
     if rows := cause_rows(result) if result.named else []:
         document.table(
             ["quantity", "unit", "value ± sd:", "from zero:", "bound:"],
             rows,
             "Size of the named causes, fitted together with all unknowns. Changes of a link are in the link's axes, "
-            "with its inertia about its centre of mass; all other vectors are in base or sensor axes.",
+            "with its inertia about its centre of mass; sensor errors are in sensor axes, other vectors in base axes.",
         )
     elif result.named:
         document.paragraph("The named causes have no free parameter: physics determines their size.")

@@ -50,7 +50,7 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
             figures.parameter_forest(changes),
             "Inertial parameters relative to their values without the named causes; bars are 95 % intervals. The "
             "axis covers the two fits: a wider prior is a line over the whole width. A shift beyond the bars is an "
-            "error that would have gone unnoticed without the diagnosis.",
+            "error that the stated standard deviations do not cover.",
         )
     _add_disturbance(document, result)
 

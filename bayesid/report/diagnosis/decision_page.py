@@ -114,7 +114,7 @@ def _change_text(result: Diagnosis) -> str:
             f"{error.kind.value} {format_number(error.before, 2)}{after} (noise alone "
             f"{format_number(error.noise, 2)}) {format_unit(error.kind.unit)}"
         )
-    return f"{text} RMS error of the simulation: {'; '.join(errors)}."
+    return f"{text} RMS error of the simulation, three axes together: {'; '.join(errors)}."
 
 
 def _moved_text(moved: ParameterChange) -> str:

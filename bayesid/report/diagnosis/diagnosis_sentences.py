@@ -169,7 +169,7 @@ def alarm_sentence(result: Diagnosis) -> str:
     return (
         f"Of {alarm.tests} tests of the residuals of the present model, the most significant is that for "
         f"{alarm.loudest} (p {relation(format_p_value(alarm.p_value))}, adjusted for all tests). The alarm "
-        f"threshold is {alarm.level:g}: {found}."
+        f"threshold is {alarm.level:g}: {found}. A low p indicates that something is missing, not what it is."
     )
 
 
@@ -182,7 +182,7 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
         ]
         if amplitude := amplitudes_of(result.after, label):
             rest = "; the table of the named causes lists all of them" if len(amplitude) > AT_MOST else ""
-            parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
+            parts.append(f"Its size (± 1 sd): {amplitude_text(amplitude, AT_MOST)}{rest}.")
         if instants := instants_of(result.after, label):
             parts.append(f"When: {amplitude_text(instants, len(instants))}.")
         if others := result.verdict.equivalent_to.get(label):
@@ -237,7 +237,7 @@ def gain_sentence(result: Diagnosis) -> str:
 def wrench_sentence(wrench: DisturbingWrench) -> str:
     """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
-        return "No torque or force on the base would explain more of the residual than noise alone."
+        return "No torque or force on the base would reduce the residual by more than it would reduce pure noise."
     where = (
         FIXED[wrench.fixed_in]
         if wrench.fixed_in

@@ -44,8 +44,8 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
             ("Named causes" if result.named else "The most probable causes")
             + " and those that imitate them best, apart from what the model's unknowns explain. If the largest "
             "cosine is near one, some effect of one cause can be mistaken for some effect of the other; if the "
-            "smallest is also near one, these manoeuvres cannot separate the two at all. From the given "
-            "signal-to-noise ratio, either is distinguished from the other in 95 % of all cases.",
+            "smallest is also near one, these manoeuvres cannot separate the two at all. At the given "
+            "signal-to-noise ratio and above, the two are distinguished in 95 % of all cases.",
         )
     document.paragraph("How the verdict was reached:")
     document.items([*method_sentences(result), computation_sentence(result)])
@@ -59,7 +59,7 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
             "only weak evidence of their absence."
         )
         document.table(
-            ["candidate", "power:", "95 % limits on its magnitude"],
+            ["candidate", "power:", "95 % limits, if the only cause"],
             unseen_rows(hidden),
             "Candidates that these manoeuvres could hardly have detected.",
         )
@@ -145,8 +145,8 @@ def _listed_text(result: Diagnosis) -> str:
         return " The appendix lists all of them."
     verb = "is" if len(others) == 1 else "are"
     return (
-        f" The appendix lists {len(listed)} of these candidates; without a linear response, and therefore omitted "
-        f"there, {verb} {joined(others)}."
+        f" The appendix lists {len(listed)} of these candidates; {joined(others)} {verb} omitted there, without a "
+        "linear response."
     )
 
 

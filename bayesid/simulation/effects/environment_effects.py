@@ -307,7 +307,7 @@ class MagneticDipole(Effect):
 class ThrusterLeak(Effect):
     """Constant force and torque fixed in the base, such as those of a valve that does not close.
 
-    The prior of 50 mN and 50 mN m is one per cent of a small thruster on a lever of one metre.
+    The priors of 50 mN and 50 mN m are one per cent of a thruster of 5 N, and of its torque at a lever of one metre.
     """
 
     name = "thruster-leak"

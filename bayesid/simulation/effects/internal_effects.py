@@ -85,7 +85,7 @@ class WheelMomentum(Effect):
     )
     separated_by = (
         "Its torque grows with the base's rate: repeat with the base rotating faster and about other axes; a torque "
-        "at rest is not caused by wheels."
+        "on a base that does not rotate is not caused by wheels at constant speed."
     )
 
     def __init__(self, sigma: float = 1.0) -> None:

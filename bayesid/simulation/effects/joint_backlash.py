@@ -59,18 +59,20 @@ FINE = 20
 class JointBacklash(DisplacedMotion, OnJoint):
     """Play of a joint: the link is offset from the encoder, at one side of a gap, and occasionally crosses the gap.
 
-    Its parameters are the offsets of three mechanisms:
+    Its parameters are the offsets of three mechanisms.
 
-    - *coasting*, without friction: the flank that drives the link pushes it from behind, so that the link trails the
-      encoder in the direction of its acceleration. When the torque through the joint changes its sign, the link coasts
-      to the other flank; the duration follows from the slope of the torque and a gap of 1 mrad (or 1 mm). The impact at
-      the end is omitted. The torque is that of the robot's bodies, with the centres of the priors for unknown ones.
-    - *waiting*, with the friction of a bearing or cables: the link trails the encoder in the direction of its motion.
-      When the joint reverses, the link stands still until the gap is crossed.
-    - *leaping*, with friction, too: when the joint reverses, the link moves on evenly and the encoder crosses the gap
-      while the friction changes its sign, which takes longer, the slower the link is. Three parts, sharp, even
-      and soft, stand for three such speeds and allow for any friction. Their form is the one in the smoothed
-      recording.
+    Coasting, without friction: the flank that drives the link pushes it from behind, so that the link trails the
+    encoder in the direction of its acceleration. When the torque through the joint changes its sign, the link coasts
+    to the other flank; the duration follows from the slope of the torque and a gap of 1 mrad (or 1 mm). The impact at
+    the end is omitted. The torque is that of the robot's bodies, with the centres of the priors for unknown ones.
+
+    Waiting, with the friction of a bearing or cables: the link trails the encoder in the direction of its motion.
+    When the joint reverses, the link stands still until the gap is crossed.
+
+    Leaping, also with friction: when the joint reverses, the link moves on evenly and the encoder crosses the gap
+    while the friction changes its sign, which takes longer, the slower the link is. Three parts, sharp, even
+    and soft, stand for three such speeds and allow for any friction. Their form is the one in the smoothed
+    recording.
     """
 
     name = "joint-backlash"

@@ -84,7 +84,7 @@ class _OnTorque(OnJoint):
 class JointFriction(_OnTorque):
     """Dry and viscous friction between motor and link: ``coulomb sign(v) + viscous v``.
 
-    Samples of a nearly stationary joint are omitted. The priors of 5 N m and 50 N m s/rad include the gears of
+    Samples of a nearly stationary joint are omitted. The priors of 5 N m and 50 N m s include the gears of
     large manipulators. Friction appears in torques only, since the motion of the joints is measured.
     """
 

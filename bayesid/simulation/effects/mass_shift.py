@@ -35,9 +35,9 @@ class MassShift(Effect):
 
     A mass m that moves from a to b changes the first moment by ``m (b - a)`` and the second by ``m (b b' - a a')``;
     the base's mass stays the same. The angular momentum about the common centre of mass and the attitude are the same
-    before and after; the base's rate jumps. The moments remain changed until the recording ends. The next recording
-    begins without the change unless its instant is negative. The instant is a constant of the effect; a diagnosis
-    determines it.
+    before and after; the base's rate jumps. The moments remain changed until the recording ends. Every
+    recording begins with the mass in its original place; a negative instant stands for a mass that has already moved.
+    The instant is a constant of the effect; a diagnosis determines it.
 
     The motion of the mass itself is omitted. While it moves, it turns the base by about ``m a x (b - a)`` divided by
     the inertia, where a and b are measured from the common centre of mass; the speed of the mass does not matter. On a

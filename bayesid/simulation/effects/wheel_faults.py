@@ -148,7 +148,9 @@ class WheelTilt(OnWheel):
 
     name = "wheel-tilt"
     summary = "The wheel's axis is slightly misaligned: its momentum also rotates the base about other axes."
-    separated_by = "It rotates the base normal to the wheel's axis: accelerate that wheel with the others at rest."
+    separated_by = (
+        "It rotates the base about axes normal to the wheel's: accelerate that wheel with the others at rest."
+    )
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
         super().__init__(place)
@@ -212,8 +214,8 @@ class WheelImbalance(OnWheel):
     about the common centre of mass. The dynamic one is the momentum across the axis per speed. The line has order one
     unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed given by the
     order. In the readings the line is as sharp as the smoothed speed, and the influence of the base's rotation on it is
-    neglected. Where the wheel turns faster than half the sampling rate, it is not a candidate: averages over blocks
-    contain no such line, and ``blocks_per_second = 0`` uses all samples.
+    neglected. Where the line lies above half the rate of the data that are used, blocks or samples, it is not a
+    candidate; ``blocks_per_second = 0`` uses all samples and raises that limit.
 
     Parameters
     ----------

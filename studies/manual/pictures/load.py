@@ -63,10 +63,10 @@ def reading(folder: Path) -> str:
     """Return what the picture of the load states."""
     _, _, guess, prior, mean, sd, truth = next(_values(folder))
     return (
-        f"The guess of {format_number(guess)} kg, whose prior (orange) is uncertain by {format_number(prior, 2)} kg "
-        f"(68 %), becomes {format_number(mean)} ± {format_number(sd, 2)} kg (1 sigma); the simulated load has "
-        f"{format_number(truth)} kg. The centre of mass moves from the guess to the truth. The base and the arm, which "
-        "give the scale, limit the accuracy of the mass."
+        f"The guess of {format_number(guess)} kg, whose prior (orange) has a central 68 % interval of ± "
+        f"{format_number(prior, 2)} kg, becomes {format_number(mean)} ± {format_number(sd, 2)} kg (1 sigma); the "
+        f"simulated load has {format_number(truth)} kg. The centre of mass moves from the guess to the truth. The base "
+        "and the arm, which give the scale, limit the accuracy of the mass."
     )
 
 
