@@ -130,7 +130,7 @@ def test_a_recording_without_noise_is_fitted_at_the_truth():
 
 @pytest.mark.usefixtures("slow")
 def test_the_whole_study_small(tmp_path):
-    result = run(seed=2, search=Search(starts=1, iterations=4), starts=3, repeats=4, random=8, points=2)
+    result = run(seed=2, search=Search(starts=1, iterations=4), starts=4, repeats=4, random=8, points=2)
     for name, item in result.contest.designs.items():
         assert all(reached.kept for reached in item.reached), name
     for row in mission.ROWS:
