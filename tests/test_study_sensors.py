@@ -233,7 +233,7 @@ def test_errors_of_smoothed_joints_are_overstated_at_most_by_the_motion_that_is_
 
 @pytest.mark.usefixtures("slow")
 def test_the_study(tmp_path):
-    result = run(effort=Effort(8, likelihood_fits=2, paper_fits=1, levels=("0.04 deg/s", REALISTIC)))
+    result = run(effort=Effort(8, likelihood_fits=3, paper_fits=2, levels=("0.04 deg/s", REALISTIC)))
     for level, refits in result.refits.items():
         assert refits[LIKELIHOOD].difference[JUDGED].max() < (0.3 if level == "0.04 deg/s" else 0.05)
         assert np.isfinite(refits[PAPER].nonlinear.errors).all()
