@@ -24,9 +24,10 @@ LEFT_OUT = (
     *("payload:link4", "link-inertia:link3", "joint-flexibility:joint3", "encoder-offset:joint3"),
     *("wheel-momentum", "thruster-leak", "coloured-noise:accel", "outliers:accel", "quantisation:accel", "accel-clock"),
     *("fuel-slosh", "wandering-torque", "mass-shift", "wheel-history:z", "attitude-misalignment"),
-    *("null, at rest", "null, fast tumble"),
+    *("flexible-appendage", "joint-flexibility:joint2", "rate-latency", "growing-torque", "payload:link3, rate-bias"),
+    *("null, at rest", "null, fast tumble", "null, four joints, own sampling rates", "null, coarse encoder"),
 )
-"""Cases of which a pair, another joint or sensor, or a file of tests of its own hides the same cause."""
+"""Cases of which a pair, another joint or sensor, or another file of tests hides the same cause."""
 
 FOUND = (
     "payload:link3",

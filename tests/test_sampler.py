@@ -56,7 +56,7 @@ class Dynesty:
         from dynesty import NestedSampler
 
         broad, n = Broad(target), target.posterior.size
-        sampler = NestedSampler(broad.log_likelihood, broad.transform, n, nlive=60, rstate=rng)
+        sampler = NestedSampler(broad.log_likelihood, broad.transform, n, nlive=35, rstate=rng)
         sampler.run_nested(print_progress=False, dlogz=1.0)
         results = sampler.results
         self.log_evidence, self.error = float(results.logz[-1]), float(results.logzerr[-1])

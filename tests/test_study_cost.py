@@ -121,12 +121,13 @@ def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_small_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XLA_FLAGS", QUICKLY)  # of the commands, in processes of their own
+    monkeypatch.setattr("studies.cost.run.COUNTS", (4,))
     cost = run(titles=("nothing",), commands=())
     cold, warm = cost.diagnoses["nothing"]
     assert cold.wall > cold.to_verdict > 0.0
     assert warm.phases["compile"] < cold.phases["compile"]
     assert 0.3 < warm.memory < 8.0
-    assert max(cost.candidates) > 30
+    assert list(cost.candidates) == [4]
     assert cost.search is None
     STUDY.write(cost, tmp_path / "cost.pdf")
     assert broken_rules(tmp_path / "cost.pdf", full=False) == []

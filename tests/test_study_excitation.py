@@ -10,14 +10,14 @@ import pytest
 from scipy import stats
 
 from bayesid import Robot
-from bayesid.design import Search, Store
+from bayesid.design import Search, SearchResult, Store
 from studies.base_body import paper
 from studies.common import mission
 from studies.common.repeated_fits import Realised, Reference, ratio_interval
 from studies.common.study import Verdict
 from studies.excitation import STUDY, run
 from studies.excitation.report import goals, near, realised_goal, scale_error
-from studies.excitation.search import Cloud, Crowd, Rivals, Searches, other_problem, other_robots, paper_problem, shrunk
+from studies.excitation.search import Cloud, Crowd, Rivals, Searches, other_robots, paper_problem, shrunk
 from tests.report_rules import broken_rules
 
 FACTOR = np.tril(np.random.default_rng(8).normal(size=(10, 10)), -1) + np.diag(np.geomspace(0.1, 1.0, 10))
@@ -165,16 +165,23 @@ def test_the_whole_study_small(tmp_path):
         assert largest.verdict is verdict  # with the crowd's own, two and four followed searches agree
 
 
-@pytest.mark.usefixtures("slow")
-def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(monkeypatch, tmp_path):
+def drawn(problem, criterion, rng, search, *, known, keep, progress):
+    """A search whose descents end where they begin."""
+    names = [f"0.{start}" for start in range(search.starts)]
+    for name in names:
+        if known(name) is None:
+            keep(name, rng.normal(size=problem.plan.family.centre.shape), rng.normal(), 1)
+    parameters, cost, _ = min(map(known, names), key=lambda descent: descent[1])
+    return SearchResult(parameters, cost, (cost,), 1)
+
+
+def test_searches_on_other_robots_are_resumed_from_the_store(monkeypatch, tmp_path):
     monkeypatch.setattr("studies.excitation.search.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
-    store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(2, 4), Search(1, 4, exchanges=1))
-    told: list[str] = []
-    found = other_robots(1, *efforts, store, told.append)
-    assert list(found) == ["a table"]
-    (own,) = found.values()
-    problem = other_problem(Robot.shipped("planar"))
-    assert own.crowd < problem.cost(problem.criteria[0], problem.plan.family.centre)[0]
-    again = other_robots(1, *efforts, Store.open(tmp_path / "store.json", "small"), told.append)
-    assert again == found
-    assert any("100 %" in line for line in told)
+    monkeypatch.setattr("studies.excitation.search.optimise", drawn)
+    efforts = Search(200), Search(1)
+    rivals = other_robots(1, *efforts, Store.open(tmp_path / "store.json", "small"), print)
+    assert list(rivals) == ["a table"]
+    assert rivals["a table"].crowd < rivals["a table"].search
+    assert other_robots(1, *efforts, Store.open(tmp_path / "store.json", "small"), print) == rivals
+    assert other_robots(1, *efforts, Store.forgetful(), print) == rivals
+    assert other_robots(2, *efforts, Store.open(tmp_path / "store.json", "other"), print) != rivals
