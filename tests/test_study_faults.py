@@ -39,6 +39,14 @@ def test_faults_around_a_run_get_one_clear_error(title):
     assert found["refused"], found["said"]
 
 
+@pytest.mark.parametrize(("slip", "unit"), [("rate in arcseconds per second", "arcsec/s"), ("acceleration in g", "g")])
+def test_a_wrong_unit_is_refused_with_the_unit_that_it_is(slip, unit):
+    """Rates that nothing can follow, which a simulation must not try."""
+    found = attempt({"unit": slip}, np.random.default_rng(0))
+    assert found["noticed"], found["said"]
+    assert f'unit = "{unit}"' in found["said"]
+
+
 @pytest.mark.slow
 def test_spoilt_files_are_counted():
     found = attempt({"spoil": 3, "changes": 20}, np.random.default_rng(0))
@@ -51,7 +59,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     answers = {"insert": {"refused": 4, "accepted": 2}, "cut off": {"faulty": 1}}
     made = [
         {"spoil": 1, "answers": answers, "faults": ["KeyError"]},
-        {"unit": "acceleration in g", "refused": False, "said": ""},
+        {"unit": "acceleration in g", "noticed": False, "said": ""},
         {"around": "a full disk", "refused": True, "said": "Error: No space left"},
         killed,
     ]
@@ -67,7 +75,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     assert text.row(f"Same result after kills: {joined(COMMANDS)}", resumed, "FAIL")
     unmoved = "cache of another version: no effect"
     assert text.row(unmoved, "not run; for a damaged cache file see tests/test_kept_jit.py", "NOT TESTED")
-    for part in ("KeyError", "not refused", "other files", "a trial broke"):
+    for part in ("KeyError", "not noticed", "other files", "a trial broke"):
         assert part in text
     made[2] = {**made[2], "refused": False}
     STUDY.write(Result(made, []), tmp_path / "faults.pdf")

@@ -14,6 +14,7 @@ from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
 from bayesid.inference.data import RecordedSamples, attitudes_of, grids_of
+from bayesid.recording.plausibility import refuse_unfollowed_base
 from bayesid.recording.recording import Recording
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
@@ -27,6 +28,12 @@ LONGEST_STEP = 2.0
 
 STEP_TOLERANCE = 0.01
 """Largest integration error allowed, in standard deviations of a sample."""
+
+SHORTEST_STEP = 2e-4
+"""Shortest integration step [s]."""
+
+MOST_PER_ROW = 64.0
+"""Number of steps from one row of a recording to the next beyond which its motion is taken for one in wrong units."""
 
 HOPELESS = 1.0 / 64.0
 """Part of the first step at which a simulation without finite readings is given up."""
@@ -54,7 +61,15 @@ def choose_step(
     numbers : Numbers
     z : (size,) array
         Coordinates.
+
+    Raises
+    ------
+    InputError
+        If a recorded motion is too fast to be followed.
     """
+    for manoeuvre in manoeuvres:
+        refuse_unfollowed_base(manoeuvre.recording)
+    interval = min(float(np.median(np.diff(manoeuvre.recording.time))) for manoeuvre in manoeuvres)
     shortest = min(float(samples.time[-1]) for samples in recorded)
     step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in model.effects)])
     coarsest = step
@@ -72,7 +87,7 @@ def choose_step(
                 remedy=f"Check the units of joint motion and of the robot's inertial parameters{named}",
             )
         grids = {step: finer}
-        if step < 1e-4 * LONGEST_STEP:
+        if step < max(SHORTEST_STEP, interval / MOST_PER_ROW):
             raise _step_error(model, manoeuvres)
 
 

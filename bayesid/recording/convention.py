@@ -12,7 +12,10 @@ from typing import Any
 
 from bayesid._io.errors import InputError
 
-__all__ = ["Convention", "ConventionError", "in_one_line"]
+__all__ = ["STATE_CONVENTIONS", "Convention", "ConventionError", "in_one_line"]
+
+STATE_CONVENTIONS = "State this in the study, or run `bayesid init --fix STUDY.toml`"
+"""Remedy of wrong conventions."""
 
 HEADER_END = "\0"  # marks headers, which values in brackets may resemble
 

@@ -14,7 +14,13 @@ from bayesid.recording.recording import Recording
 from bayesid.recording.units import ANGLES, UNITS
 from bayesid.robot.robot import Joint, Robot
 
-__all__ = ["refuse_impossible_joints", "refuse_impossible_motion", "unwrapped", "whirling_rate"]
+__all__ = [
+    "refuse_impossible_joints",
+    "refuse_impossible_motion",
+    "refuse_unfollowed_base",
+    "unwrapped",
+    "whirling_rate",
+]
 
 FASTEST = 5.0  # speed of a joint relative to its limit that none reaches
 READING_ERROR = 0.01  # largest change of a reading by the noise and the steps of a coarse encoder [rad or m]
@@ -45,6 +51,23 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
         most rates of the base are above 20 rad/s and turn it by more than a radian from one reading to the next.
     """
     refuse_impossible_joints(recording, robot)
+    refuse_unfollowed_base(recording)
+
+
+def refuse_unfollowed_base(recording: Recording) -> None:
+    """Refuse rates of the base above 20 rad/s that turn it by more than a radian from one reading to the next.
+
+    Its motion between the readings is then undetermined, and a simulation that followed it would take steps so short
+    that neither time nor memory suffices.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Raises
+    ------
+    ConventionError
+    """
     whirling = whirling_rate(recording)
     if whirling is None or whirling[1] * recording.interval(whirling[0]) < FOLLOWED:
         return

@@ -34,8 +34,8 @@ from studies.faults.surroundings import (
     Spoilt,
     answer_amid,
     answer_to,
+    answer_to_unit,
     can_fill_a_disk,
-    refused,
     spoilt,
 )
 from studies.truth.bodies import SERVICER3
@@ -64,8 +64,8 @@ def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
         if "spoil" in task:
             return _spoil(task["spoil"], task["changes"], study, folder / "spoilt")
         if "unit" in task:
-            clear, said = refused(study, task["unit"], folder)
-            return {"refused": clear, "said": said}
+            noticed, said = answer_to_unit(study, task["unit"], folder)
+            return {"noticed": noticed, "said": said}
         if "around" in task:
             clear, said = answer_amid(study, task["around"], folder)
             return {"refused": clear, "said": said}
@@ -104,7 +104,7 @@ def _spoil(seed: int, changes: int, study: Path, folder: Path) -> dict[str, Any]
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
 
 Made = Mapping[str, Any]  # a task with its result
-NAMED = re.compile(r"\.(csv|toml|urdf): ")  # file in a message, with what follows on the place in it
+STATED = re.compile(r"\[\w+\] (unit|time_unit) = ")  # lines of a study in a message that put a unit right
 
 
 @dataclass(frozen=True)
@@ -172,8 +172,8 @@ def _report(result: Result) -> Report[Result]:
         question="How do commands respond to corrupted files, wrong units and kills at random times?",
         answer=f"{numbers['faulty']} of {counted(sum(numbers.values()), 'corrupted file')} got an unclear answer. "
         f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
-        f"{sum(task['refused'] for task in units.values())} of {counted(len(units), 'wrong unit')} "
-        f"{'was' if len(units) == 1 else 'were'} refused; after {counted(result.kills, 'kill')} "
+        f"{sum(task['noticed'] for task in units.values())} of {counted(len(units), 'wrong unit')} "
+        f"{'was' if len(units) == 1 else 'were'} noticed; after {counted(result.kills, 'kill')} "
         f"{sum(task['same'] for task in killed.values())} of {counted(len(killed), 'command')} gave the same result as "
         "an uninterrupted run.",
         goals=_goals(result),
@@ -189,8 +189,8 @@ def _report(result: Result) -> Report[Result]:
 def _failures(document: Document, result: Result) -> None:
     document.section("What went wrong")
     wrong = [text for task in result.spoilt for text in task["faults"]]
-    for key in ("unit", "around"):
-        wrong += [f"{title}: {i['said'] or 'not refused'}" for title, i in result.by(key).items() if not i["refused"]]
+    for key, good in (("unit", "noticed"), ("around", "refused")):
+        wrong += [f"{title}: {i['said'] or f'not {good}'}" for title, i in result.by(key).items() if not i[good]]
     wrong += [f"{name} after kills: {task['message']}" for name, task in result.by("kill").items() if not task["same"]]
     wrong += [f"A trial failed: {text}" for text in result.failures]
     document.items([_short(text) for text in wrong])
@@ -216,14 +216,14 @@ def _kills(document: Document, result: Result) -> None:
 
 
 def _said(document: Document, result: Result) -> None:
-    for key, section, title, caption in (
-        ("unit", "Wrong units", "unit", "Messages of the command check for wrong units."),
-        ("around", "Faults around a run", "fault", "Messages of commands for faults around a run."),
+    for key, good, section, title, caption in (
+        ("unit", "noticed", "Wrong units", "unit", "Messages of the command check for wrong units."),
+        ("around", "refused", "Faults around a run", "fault", "Messages of commands for faults around a run."),
     ):
-        said = [[name, "yes" if i["refused"] else "no", _short(i["said"])] for name, i in result.by(key).items()]
+        said = [[name, "yes" if i[good] else "no", _short(i["said"])] for name, i in result.by(key).items()]
         if said:
             document.section(section)
-            document.table([title, "refused", "message"], said, caption)
+            document.table([title, good, "message"], said, caption)
 
 
 def _conditions(document: Document, result: Result) -> None:
@@ -231,7 +231,8 @@ def _conditions(document: Document, result: Result) -> None:
     document.paragraph(
         "MuJoCo generates the files. Hypothesis draws the corruption of a file: one value is replaced, text is "
         "inserted, the end is cut off, a line is dropped or repeated, or a byte is changed. The file counts as refused "
-        "if the exit status is 2, one message begins with Error, nothing is written and Python gives no warning. The "
+        "if the exit status is 2, one message begins with Error, nothing is written and Python gives no warning. A "
+        "wrong unit counts as noticed if check refuses it in this way or names it as a convention. The "
         "full disk has a capacity of 16 kB. The other version, whose cache an identification reads, computes a "
         "gravity-gradient torque a hundred times as large."
     )
@@ -241,8 +242,8 @@ def _goals(result: Result) -> list[Goal]:
     numbers, units, killed = result.numbers, result.by("unit"), result.by("kill")
     total, kills = sum(numbers.values()), result.kills
     broken = [name for task in killed.values() for name in task["half_written"]]
-    refused = sum(task["refused"] for task in units.values())
-    named = sum(task["refused"] and bool(NAMED.search(task["said"])) for task in units.values())
+    noticed = [task for task in units.values() if task["noticed"]]
+    stated = sum(bool(STATED.search(task["said"])) for task in noticed)
     goals = (
         (
             "No unclear answer to a corrupted file",
@@ -252,8 +253,8 @@ def _goals(result: Result) -> list[Goal]:
         ),
         (
             "No wrong unit passes unnoticed",
-            f"{refused} of {len(units)} refused, {named} with file and location",
-            refused == len(units),
+            f"{len(noticed)} of {len(units)} refused or named, {stated} with the unit for the study",
+            len(noticed) == len(units),
             len(units) == len(SLIPS),
         ),
         (

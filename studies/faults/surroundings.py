@@ -295,11 +295,15 @@ SLIPS: Mapping[str, Callable[[Path], None]] = {
 }
 
 
-def refused(study: Path, slip: str, folder: Path) -> tuple[bool, str]:
-    """Return whether ``bayesid check`` refuses a study with one wrong unit with exit status 2, and what it says."""
+def answer_to_unit(study: Path, slip: str, folder: Path) -> tuple[bool, str]:
+    """Return whether ``bayesid check`` refuses or names one wrong unit, and what it says, in one line.
+
+    It refuses with one message and exit status 2, or names a convention that a unit is among and says what remains.
+    """
     copied = folder / "study"
     shutil.copytree(study.parent, copied)
     SLIPS[slip](copied)
     done = CliRunner().invoke(app, ["check", str(copied / study.name), "--output", str(folder / "out")])
-    clear = done.exit_code == 2 and done.output.startswith("Error: ") and not (folder / "out").exists()
-    return clear, " ".join(done.output.split())
+    clear, said = _judged(done.exit_code, done.output)
+    named = done.exit_code == 0 and bool(re.search(r"^convention:unit:", done.output, re.MULTILINE))
+    return clear or named, said

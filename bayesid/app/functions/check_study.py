@@ -9,6 +9,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._io.short_form import ShortForm, Summary
 from bayesid.app.functions.study_source import StudySource, study_of
@@ -17,7 +18,7 @@ from bayesid.inference.conventions import find_conventions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import RecordingCheck, check_recordings
 from bayesid.inference.wrong_units import refuse_wrong_units
-from bayesid.recording.convention import Convention
+from bayesid.recording.convention import STATE_CONVENTIONS, Convention, ConventionError
 
 __all__ = ["StudyCheck", "check"]
 
@@ -88,8 +89,13 @@ def check(
         model = load_model(study)
         manoeuvres = load_manoeuvres(study, model.robot, part_of(progress, 0.0, 0.7), executor)
         conventions = find_conventions(model, manoeuvres)
-        # nothing is fitted: the samples' correlations do not matter
-        posterior = Posterior.of(model, manoeuvres, window=0)
+        try:
+            # nothing is fitted: the samples' correlations do not matter
+            posterior = Posterior.of(model, manoeuvres, window=0)
+        except InputError:  # with such readings nothing can be simulated
+            if conventions:
+                raise ConventionError(conventions, file=study.file, remedy=STATE_CONVENTIONS) from None
+            raise
         if not conventions:
             refuse_wrong_units(posterior)
     checks = tuple(check_recordings(posterior, part_of(progress, 0.8, 1.0)))

@@ -19,7 +19,7 @@ from bayesid._math.arrays import log_sum
 from bayesid.inference.conventions.mistake import LEVELS, Mistake, convention_families
 from bayesid.inference.conventions.momentum_balance import BalanceFit, BalanceProblem, MomentumBalance
 from bayesid.inference.conventions.readings_on_grid import ReadingsOnGrid
-from bayesid.recording.convention import Convention, ConventionError
+from bayesid.recording.convention import STATE_CONVENTIONS, Convention, ConventionError
 from bayesid.recording.recorded_as import RecordedAs, SensorRecordedAs
 from bayesid.recording.suspect_readings import suspect_readings
 from bayesid.simulation.model import Manoeuvre, Model
@@ -202,8 +202,7 @@ def refuse_conventions(model: Model, manoeuvres: Sequence[Manoeuvre]) -> None:
     ConventionError
     """
     if conventions := find_conventions(model, manoeuvres):
-        remedy = "State this in the study, or run `bayesid init --fix STUDY.toml`"
-        raise ConventionError(conventions, remedy=remedy)
+        raise ConventionError(conventions, remedy=STATE_CONVENTIONS)
 
 
 def _without(manoeuvre: Manoeuvre, conventions: Sequence[Convention]) -> Manoeuvre:
