@@ -208,13 +208,28 @@ class Changed(Effect):
 CHANGED = unknowns(effects=(Shared(), Changed(), Own()))
 
 
-@pytest.mark.parametrize("layout", [unknowns(), mixed(), CHANGED], ids=["spreads", "mixing", "effect on a body"])
+ONE = unknowns(bodies=(BodyPrior("base_link", CENTRE, 0.3),), rigid=True)  # a robot without joints
+
+
+@pytest.mark.parametrize(
+    "layout", [unknowns(), mixed(), CHANGED, ONE], ids=["spreads", "mixing", "effect on a body", "no joints"]
+)
 def test_linear_coordinates_invert_and_have_the_stated_volume(layout):
     z = 0.5 * np.random.default_rng(8).normal(size=layout.size)
     np.testing.assert_allclose(layout.from_linear(layout.to_linear(z[None]))[0], z, atol=1e-9)
     sign, log = np.linalg.slogdet(layout.linear_slope(z))
     assert abs(sign) == 1.0  # the order of the entries makes it negative for an odd number of bodies
     assert log == pytest.approx(float(layout.log_volume(z[None])[0]), abs=1e-8)
+
+
+def test_without_joints_bodies_that_move_alike_differ_in_one_linear_coordinate():
+    """Centre of mass and inertia about it are alike in both bodies, and masses are not."""
+    heavy = InertialParameters(2.0 * CENTRE.mass, CENTRE.com, CENTRE.inertia)
+    z = np.array([ONE.coordinates([body]) for body in (CENTRE, heavy)])
+    light, other = ONE.to_linear(z)
+    difference = np.abs(other - light)
+    assert np.sum(difference > 1e-9) == 1
+    assert difference.max() == pytest.approx(np.log(2.0) / 0.3)
 
 
 def test_a_mixing_must_fit_the_bodies():

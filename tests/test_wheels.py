@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bayesid
 from bayesid import BodyPrior, InertialParameters, InputError, Manoeuvre, Model, Recording, Robot, Wheel
 from bayesid.app.demo_command import _copy_demonstration
 from bayesid.app.schema import Study
@@ -96,3 +97,16 @@ def test_the_example_of_a_satellite_of_wheels_is_a_study(tmp_path):
     assert recording.wheels == tuple(wheel.name for wheel in model.robot.wheels)
     with pytest.raises(InputError, match="no example 'legs'"):
         _copy_demonstration("legs", tmp_path)
+
+
+@pytest.mark.slow
+def test_slews_by_wheels_do_not_determine_the_mass(tmp_path):
+    """Differential evolution of the whole posterior in log mass, centre of mass and inertia gives 1.63 +- 1.00."""
+    _copy_demonstration("wheels", tmp_path)
+    file = tmp_path / "study.toml"
+    file.write_text(file.read_text() + '\n[model]\neffects = ["wheel-tilt:wheel2"]\n')
+    result = bayesid.identify(file, 1, effective_samples=1000.0)
+    assert result.evidence.trusted
+    log_mass = np.log(result.posterior.unknowns.values_of(result.chains.flat).inertial[:, 0])
+    assert log_mass.mean() == pytest.approx(1.63, abs=0.2)
+    assert log_mass.std() == pytest.approx(1.00, rel=0.12)

@@ -81,6 +81,7 @@ class Plan:
             rate_sigma=self.model.rate_sigma,
             tilt_sigma=(self.attitude_sigma,),
             mixing=self.model.mixing,
+            rigid=not self.model.robot.joints,
         )
 
     @cached_property

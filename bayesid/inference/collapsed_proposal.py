@@ -10,6 +10,7 @@ computations, Journal of the American Statistical Association 89).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -41,8 +42,47 @@ BLOCK, LONGEST = 250, 6000
 BURN_IN = 5.0
 """Steps that are left out at first, in autocorrelation times."""
 
+JUDGED = 8
+"""One walker in so many is taken for the autocorrelation: its time is a mean over walkers, and transforms take long."""
+
+LINEAR, SNOOKER = 0.5, 0.1
+"""Shares of moves in linear coordinates and of snooker moves, which emcee proposes in a loop, walker by walker."""
+
 THIN = 0.2
 """Distance of the draws that are kept, in autocorrelation times."""
+
+
+class LinearMove(DEMove):
+    """Differential evolution in the linear coordinates of widely known bodies, where a normal likelihood is no curve.
+
+    Parameters
+    ----------
+    proposal : CollapsedProposal
+    """
+
+    def __init__(self, proposal: CollapsedProposal) -> None:
+        super().__init__()
+        self.proposal = proposal
+
+    def get_proposal(self, s: Floats, c: Sequence[Floats], random: np.random.RandomState) -> tuple[Floats, Floats]:
+        """Return a proposal for each walker and the log ratio of the volumes before and after it.
+
+        Parameters
+        ----------
+        s : (count, b) array
+            Walkers to move.
+        c : sequence of (., b) arrays
+            All others.
+        random : numpy.random.RandomState
+        """
+        linear = self.proposal.linear
+        with np.errstate(all="ignore"):  # bodies too heavy for a number
+            proposed, _ = super().get_proposal(linear(s), [linear(part) for part in c], random)
+        z = self.proposal.from_linear(proposed)
+        physical = np.isfinite(z).all(axis=1)
+        z[~physical] = s[~physical]
+        ratio = self.proposal.log_volume(s) - self.proposal.log_volume(z)
+        return z, np.where(physical, ratio, -np.inf)
 
 
 @dataclass(frozen=True)
@@ -110,11 +150,25 @@ class CollapsedProposal:
 
     def log_marginal(self, wide: Floats) -> Floats:
         """Return the log density over z of the widely known bodies, up to a constant, shape (count, b) -> (count,)."""
-        away = self.unknowns.to_linear(self._with(wide))[:, self.wide] - self._centre[self.wide]
+        away = self.linear(wide) - self._centre[self.wide]
         with np.errstate(all="ignore"):  # bodies too heavy for a number
             quadratic = ((away @ self.curvature) * away).sum(axis=1)
             value = -0.5 * (wide**2).sum(axis=1) - away @ self.slope - 0.5 * quadratic
         return np.where(np.isfinite(value), value, -np.inf)
+
+    def linear(self, wide: Floats) -> Floats:
+        """Return the linear coordinates of the widely known bodies, shape (count, b) -> (count, b)."""
+        return self.unknowns.to_linear(self._with(wide))[:, self.wide]
+
+    def from_linear(self, wide: Floats) -> Floats:
+        """Return what `linear` maps to linear coordinates, not finite where no body has them."""
+        y = np.repeat(self._centre[None], len(wide), axis=0)
+        y[:, self.wide] = wide
+        return self.unknowns.from_linear(y)[:, self.wide]
+
+    def log_volume(self, wide: Floats) -> Floats:
+        """Return the log determinant of the slope of `linear`, up to a constant, shape (count, b) -> (count,)."""
+        return self.unknowns.log_volume(self._with(wide))
 
     @cached_property
     def _centre(self) -> Floats:
@@ -166,21 +220,32 @@ def collapsed_proposal(
         return None
     inner = _linearised(posterior, optimum, wide)
     state = np.random.RandomState(rng.integers(2**32, size=8, dtype=np.uint32))
-    moves = [(DEMove(), 0.75), (DESnookerMove(), 0.25)]
+    moves = [(DEMove(), 1.0 - LINEAR - SNOOKER), (LinearMove(inner), LINEAR), (DESnookerMove(), SNOOKER)]
     sampler = emcee.EnsembleSampler(WALKERS, len(wide), inner.log_marginal, moves=moves, vectorize=True)
-    factor = np.linalg.cholesky(optimum.covariance[np.ix_(wide, wide)])
-    start = optimum.z[wide] + state.normal(size=(WALKERS, len(wide))) @ factor.T
+    start = _starts(inner, optimum.covariance[np.ix_(wide, wide)], state)
     sampler.random_state = state.get_state()
     while True:
         start = sampler.run_mcmc(start, BLOCK, skip_initial_state_check=True)
         chain = sampler.get_chain()
-        tau = autocorrelation_time(chain)
+        tau = autocorrelation_time(chain[:, ::JUDGED])
         left = chain[min(int(np.ceil(BURN_IN * tau)), len(chain) // 2) :]
         worth = left.shape[0] * left.shape[1] / tau
         if len(chain) >= LONGEST or (len(chain) >= 4.0 * BURN_IN * tau and worth >= 2.0 * effective_samples):
             break
     pool = left[:: max(1, int(THIN * tau))].reshape(-1, len(wide))
     return replace(inner, pool=pool, effective_samples=worth)
+
+
+def _starts(inner: CollapsedProposal, covariance: Floats, state: np.random.RandomState) -> Floats:
+    """Return a point for each walker, normal about the mode in z or in linear coordinates, the more probable one."""
+    mode, normal = inner.mode[inner.wide], state.normal(size=(WALKERS, len(inner.wide)))
+    away = normal @ np.linalg.cholesky(covariance).T
+    slope = inner.unknowns.linear_slope(inner.mode)[np.ix_(inner.wide, inner.wide)]
+    curved, straight = mode + away, inner.from_linear(inner.linear(mode[None]) + away @ slope.T)
+    straight = np.where(np.isfinite(straight).all(axis=1, keepdims=True), straight, curved)
+    with np.errstate(invalid="ignore"):  # where neither has a density
+        gain = inner.log_marginal(straight) - inner.log_marginal(curved)
+    return np.where(gain[:, None] > 0.0, straight, curved)
 
 
 def _linearised(posterior: Posterior, optimum: Optimum, wide: Integers) -> CollapsedProposal:

@@ -298,6 +298,7 @@ def _unknowns(model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[
         mixing=model.mixing,
         speed_sigma=speeds,
         joints=joints,
+        rigid=not model.robot.joints,
     )
 
 

@@ -28,7 +28,10 @@ from bayesid.robot.log_cholesky import (
     LOG_CHOLESKY,
     SLOPE,
     absolute,
+    central,
+    from_central,
     log_volume,
+    log_volume_of_central,
     relative,
     upper_cholesky,
     vector_from_factor,
@@ -69,6 +72,8 @@ class Unknowns:
         has no such errors (`Model.has_speed_errors`).
     joints : (J,) tuple of str
         Names of the joints with such errors.
+    rigid : bool
+        Whether the robot has no joints, so that its motion determines centres of mass and not masses.
     """
 
     bodies: tuple[BodyPrior, ...]
@@ -79,6 +84,7 @@ class Unknowns:
     mixing: Mixing | None = None
     speed_sigma: tuple[tuple[float, ...], ...] = ()
     joints: tuple[str, ...] = ()
+    rigid: bool = False
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -107,6 +113,7 @@ class Unknowns:
             rates=self.rate_sigma > 0.0,
             tilts=tuple(index for index, sigma in enumerate(self.tilt_sigma) if sigma > 0.0),
             joints=len(self.joints),
+            rigid=self.rigid,
             effects=tuple(
                 EffectLayout(
                     tuple(parameter.prior for parameter in effect.parameters), effect.per_recording, effect.is_body
@@ -335,6 +342,8 @@ class Layout:
         Number of joints whose speed at time 0 is uncertain; 0 where such errors do not matter.
     effects : tuple of EffectLayout
         Layout of every effect, with or without parameters.
+    rigid : bool
+        As for `Unknowns`.
     """
 
     bodies: int
@@ -343,6 +352,7 @@ class Layout:
     tilts: tuple[int, ...]
     joints: int
     effects: tuple[EffectLayout, ...]
+    rigid: bool = False
 
     def body(self, index: int) -> slice:
         """Return the coordinates of one body."""
@@ -469,12 +479,12 @@ class Layout:
         return Values(vectors.ravel(), rate, tilt, speed, tuple(effects))
 
     def to_linear(self, numbers: PriorNumbers, z: Array) -> Array:
-        """Return the coordinates that are linear in the inertial parameters.
+        """Return the coordinates in which ridges of the posterior are straight.
 
         They are the entries of each body's relative pseudo-inertia, less the identity, scaled so that near the centre
         they are z itself, and so for a body that an effect changes. All other unknowns keep their coordinates. The
-        dynamics determines linear combinations of inertial parameters sharply up to a common factor, so that ridges of
-        the posterior are straight here.
+        dynamics determines linear combinations of inertial parameters sharply up to a common factor. Where the robot
+        has no joints, it determines centre of mass and inertia about it; then these and the log mass are coordinates.
 
         Parameters
         ----------
@@ -482,7 +492,7 @@ class Layout:
         z : (size,) array
             Coordinates.
         """
-        entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
+        entries = jax.vmap(central if self.rigid else relative)(self._theta(numbers, z)).ravel()
         y = jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
         for index, part in self.changed_bodies:
             sigma = numbers.effects[index][1]
@@ -499,7 +509,8 @@ class Layout:
             Linear coordinates.
         """
         entries = numbers.slope @ y[self.all_bodies]
-        theta = jax.vmap(absolute)(entries.reshape(self.bodies, PARAMETERS)).ravel()
+        inverse = from_central if self.rigid else absolute
+        theta = jax.vmap(inverse)(entries.reshape(self.bodies, PARAMETERS)).ravel()
         z = jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
         for index, part in self.changed_bodies:
             sigma = numbers.effects[index][1]
@@ -516,7 +527,8 @@ class Layout:
             Coordinates.
         """
         changed = sum(log_volume(numbers.effects[index][1] * z[part]) for index, part in self.changed_bodies)
-        return jax.vmap(log_volume)(self._theta(numbers, z)).sum() + changed
+        volume = log_volume_of_central if self.rigid else log_volume
+        return jax.vmap(volume)(self._theta(numbers, z)).sum() + changed
 
     def _theta(self, numbers: PriorNumbers, z: Array) -> Array:
         """Return the log-Cholesky coordinates of each body relative to its centre, shape (B, 10)."""

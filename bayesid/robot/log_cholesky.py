@@ -22,10 +22,13 @@ __all__ = [
     "LOG_CHOLESKY",
     "SLOPE",
     "absolute",
+    "central",
+    "from_central",
     "log_cholesky_coordinates",
     "log_cholesky_factor",
     "log_cholesky_vector",
     "log_volume",
+    "log_volume_of_central",
     "relative",
     "relative_coordinates",
     "upper_cholesky",
@@ -111,6 +114,31 @@ def absolute(entries: Array) -> Array:
     d = jnp.log(jnp.diag(unit)[:3])
     rest = jnp.stack([unit[0, 1], unit[1, 2], unit[0, 2], unit[0, 3], unit[1, 3], unit[2, 3]])
     return jnp.concatenate([jnp.log(u[3, 3])[None], d, rest])
+
+
+def central(theta: Array) -> Array:
+    """Return `relative` with log mass, centre of mass and second moments about it in place of the moments, shape (10,).
+
+    Near the centre both are alike. The motion of a rigid body determines these nine and not its mass.
+    """
+    factor = log_cholesky_factor(theta)
+    upper = factor[:3, :3]
+    matrix = jnp.zeros((4, 4)).at[:3, :3].set(upper @ upper.T - jnp.eye(3)).at[:3, 3].set(theta[7:])
+    return matrix.at[3, 3].set(2.0 * theta[0])[_ROW, _COLUMN]
+
+
+def from_central(entries: Array) -> Array:
+    """Return the log-Cholesky coordinates of `central` entries (10,), not a number where no body has them."""
+    upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(entries)
+    mass, com = jnp.exp(upper[3, 3]), upper[:3, 3]
+    about_origin = upper[:3, :3] + jnp.triu(mass * jnp.outer(com, com))
+    moments = upper.at[:3, :3].set(about_origin).at[:3, 3].set(mass * com).at[3, 3].set(mass - 1.0)
+    return absolute(moments[_ROW, _COLUMN])
+
+
+def log_volume_of_central(theta: Array) -> Array:
+    """Return the logarithm of the determinant of d central / d theta."""
+    return log_volume(theta) - 8.0 * theta[0]  # by log mass and centre of mass: 1 / mass^4, and mass = exp(2 alpha)
 
 
 def _upper_factor(matrix: Array) -> Array:
