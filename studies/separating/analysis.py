@@ -357,7 +357,7 @@ def realise(
     return rows
 
 
-FLIGHTS = 400  # number of sets of flights for each cause and direction in a full run
+QUICK_FLIGHTS = 10  # number of sets of flights for each cause and direction in a quick run
 FULL, QUICK = THOROUGH, Search(starts=2, iterations=40)  # effort of each search of a full and of a quick run
 
 
@@ -414,10 +414,11 @@ def run(
     ----------
     points : int; number of free control points of every joint
     search : Search, optional; effort of each design
+    flights : int, optional; number of sets of flights for each cause and direction, by default those of each pair in a
+        full run
     pairs : sequence of str, optional; names of the pairs, by default all in a full run and else the first
     """
     search = search or (FULL if full else QUICK)
-    flights = (FLIGHTS if full else 10) if flights is None else flights
     chosen = [PAIRS[name] for name in (pairs or (list(PAIRS) if full else list(PAIRS)[:1]))]
     store, results = store or Store.forgetful(), []
     for pair in chosen:
@@ -429,6 +430,8 @@ def run(
         kept = (
             None if trials is None else trials.with_name(f"{trials.stem}-{pair.name.replace(' ', '-')}{trials.suffix}")
         )
-        realised = realise(pair, weighing, motions, known, flights, seed, kept, progress)
+        count = flights or (pair.flights if full else QUICK_FLIGHTS)
+        realised = realise(pair, weighing, motions, known, count, seed, kept, progress)
         results.append(PairResult(pair, designs, motions, predicted, realised))
-    return Result(results, search, full and flights >= FLIGHTS and len(chosen) == len(PAIRS))
+    whole = len(chosen) == len(PAIRS) and all((flights or pair.flights) >= pair.flights for pair in chosen)
+    return Result(results, search, full and whole)

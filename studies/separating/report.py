@@ -106,7 +106,7 @@ def _counts(pair: PairResult, stage: str) -> str:
 def _report(result: Result) -> Report[Result]:
     first = result.pairs[0]
     titles = {"first": "first (the flight's)", "separation": "separating", "d-optimal": "d-optimal"}
-    count = len(first.realised[0].detected)
+    counts = [f"{len(pair.realised[0].detected)} ({pair.pair.name})" for pair in result.pairs]
     return Report(
         title="Separating two causes",
         subtitle="A manoeuvre designed to separate rivals, ETS-VII in MuJoCo",
@@ -140,8 +140,8 @@ def _report(result: Result) -> Report[Result]:
             unknown=f"With 1 sigma: {format_percent(2.0 * analysis.SPREAD)} of the base mass, the bias "
             f"({format_number(BIAS)} m/s²), the links; the cause, with the prior of a diagnosis; and the initial rate "
             f"(true value {format_vector(analysis.DRIFT)} rad/s).",
-            replicates=f"{count} sets of flights for each cause and direction, each with a separate arm, bias and "
-            f"noise; {result.search.starts} starts for each design. Evidences are linearised about the plan.",
+            replicates=f"Sets of flights for each cause and direction: {', '.join(counts)}, each with a separate arm, "
+            f"bias and noise; {result.search.starts} starts for each design. Evidences are linearised about the plan.",
         ),
         outline=robot_outline(ets7(), START),
         picture=Picture(
@@ -276,7 +276,7 @@ STUDY = Study(
     "Separate two causes that a first manoeuvre cannot distinguish.",
     run=_run,
     report=_report,
-    full=f"thorough searches, all {len(PAIRS)} pairs, {analysis.FLIGHTS} sets of flights for each cause and direction",
+    full=f"thorough searches, all {len(PAIRS)} pairs, 100 to 400 sets of flights for each cause and direction",
     seed=1,
     extra={
         "--store": {"type": Path, "help": "file for the results of the searches, to resume an interrupted run"},
