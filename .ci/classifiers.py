@@ -12,6 +12,6 @@ project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text
 classified = re.findall(r"Programming Language :: Python :: (3\.\d+)", "\n".join(project["classifiers"]))
 ran, absent = (set(argument.split()) for argument in sys.argv[1:])
 if unnamed := sorted(ran - set(classified)):
-    raise SystemExit(f"no classifier of pyproject.toml names Python {', '.join(unnamed)}, on which every command ran")
+    raise SystemExit(f"no classifier of pyproject.toml names Python {', '.join(unnamed)}, on which commands ran")
 if untried := sorted(set(classified) - ran - absent):
     raise SystemExit(f"classifiers of pyproject.toml name Python {', '.join(untried)}, on which nothing ran")

@@ -36,8 +36,8 @@ COMPILED = "BAYESID_TEST_COMPILED"
 QUICKLY = "--xla_backend_optimization_level=0"
 """Option of XLA for all but the slow tests, whose time is mostly compilation: what is compiled runs a third as fast."""
 
-LONGEST = "test_catalogue.py"
-"""The file of tests that takes longest."""
+LONGEST = ("test_catalogue.py", "test_rates.py")
+"""The files of tests that take longest."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -82,7 +82,7 @@ def _is_slow(item: pytest.Item) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect the slow tests, or all others; the catalogue begins, then the files with the fewest tests.
+    """Deselect the slow tests, or all others; the longest files begin, then those with the fewest tests.
 
     Those hold the longest tests. Were they the last, one of the two processes would wait for the other at the end.
     """
@@ -93,7 +93,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     config.hook.pytest_deselected(items=left_out)
     chosen = [item for item in items if _is_slow(item) == wanted]
     counts = Counter(item.path for item in chosen)
-    items[:] = sorted(chosen, key=lambda item: (item.path.name != LONGEST, counts[item.path]))
+    items[:] = sorted(chosen, key=lambda item: (item.path.name not in LONGEST, counts[item.path]))
 
 
 ROOT = Path(__file__).resolve().parents[1]

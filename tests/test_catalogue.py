@@ -24,6 +24,7 @@ LEFT_OUT = (
     *("payload:link4", "link-inertia:link3", "joint-flexibility:joint3", "encoder-offset:joint3"),
     *("wheel-momentum", "thruster-leak", "coloured-noise:accel", "outliers:accel", "quantisation:accel", "accel-clock"),
     *("fuel-slosh", "wandering-torque", "mass-shift", "wheel-history:z", "attitude-misalignment"),
+    *("coloured-noise:rate", "outliers:rate", "quantisation:rate", "rate-noise, accel-noise"),
     *("flexible-appendage", "joint-flexibility:joint2", "rate-latency", "growing-torque", "payload:link3, rate-bias"),
     *("null, at rest", "null, fast tumble", "null, four joints, own sampling rates", "null, coarse encoder"),
 )
