@@ -215,11 +215,11 @@ def test_the_stated_attitudes_of_all_recordings_are_put_right(tmp_path: Path) ->
 def test_a_diagnosis_ends_with_the_convention_and_init_writes_its_remedy(study: Path, tmp_path: Path) -> None:
     file, output = spoilt(study, "gyro north-east-down", tmp_path), tmp_path / "out"
     said = " ".join(diagnose_study(Study.load(file), output, 0, None))
-    assert "north-east-down" in said
+    assert "180 degrees about x" in said
     written = json.loads((output / "diagnosis.json").read_text())
     assert (written["status"], written["causes"]) == ("explained", ["convention:axes:rate"])
     assert written["conventions"][0]["remedy"] == "[sensors.rate]\nmounting = [1, 0, 0, 0]"
-    with pytest.raises(ConventionError, match="north-east-down"):
+    with pytest.raises(ConventionError, match="180 degrees about x"):
         load_posterior(Study.load(file))
     before = file.read_text()
     assert "nothing was written" in " ".join(fixed_study(file, lambda question: False))

@@ -54,7 +54,7 @@ def run(
 
 
 def _other_axes(output: Path, seed: int, progress: Progress) -> Iterator[str]:
-    """Put rate sensor and accelerometer of the recordings in north-east-down axes, diagnose, and put that right."""
+    """Put rate sensor and accelerometer of the recordings in axes turned about x, diagnose, and put that right."""
     from bayesid.app.convention_remedies import fixed_study
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
@@ -66,7 +66,7 @@ def _other_axes(output: Path, seed: int, progress: Progress) -> Iterator[str]:
         recording = Recording.read(file)
         turned = {f"{family}.{axis}": -recording.channels[f"{family}.{axis}"] for family in TURNED for axis in "yz"}
         Recording(recording.name, file, recording.time, {**recording.channels, **turned}).write(file)
-    yield f"Recordings from an independent simulator whose sensors use north-east-down axes: {folder}."
+    yield f"Recordings from an independent simulator, with sensor axes turned by 180 degrees about x: {folder}."
     yield from diagnose_study(Study.load(folder / "study.toml"), output, seed, None, progress)
     yield from fixed_study(folder / "study.toml", lambda question: True)
 

@@ -17,7 +17,7 @@ from bayesid.simulation.sensors import SensorKind
 __all__ = ["SensorAxes", "right_angles"]
 
 NORTH_EAST_DOWN = np.diag([1.0, -1.0, -1.0])
-USUAL = 0.3  # share of the axes that people use: north-east-down, and one axis or all counted the other way
+USUAL = 0.3  # share of the axes that people use: turned about x, and one axis or all counted the other way
 
 
 def right_angles() -> list[Floats]:
@@ -61,9 +61,12 @@ def _in_axes(kind: SensorKind, turn: Floats, share: float) -> Mistake:
     def text(readings: ReadingsOnGrid) -> str:
         sensor = "gyro" if kind == SensorKind.RATE else kind.instrument.name
         if np.array_equal(turn, NORTH_EAST_DOWN):
-            return f"Your {sensor} is in north-east-down axes: its x, y, z are x, -y, -z of the declared axes."
+            return (
+                f"The axes of your {sensor} are turned by 180 degrees about x, as forward-right-down is from "
+                "forward-left-up: its x, y, z are x, -y, -z of the declared axes."
+            )
         left = " They are left-handed." if mirrored else ""
-        return f"Your {sensor} is in other axes: x, y, z of the declared axes are its {shown}.{left}"
+        return f"Your {sensor} uses other axes: x, y, z of the declared axes are its {shown}.{left}"
 
     return Mistake(
         f"convention:axes:{kind.value}", kind.value, f"axes:{kind.value}", 2, undo, remedy, text, share, parts
