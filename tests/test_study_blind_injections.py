@@ -242,7 +242,8 @@ def committed():
 
 def test_the_record_that_is_shipped_is_that_of_the_committed_trials(committed):
     record = record_of(committed)
-    assert asdict(shipped_record()) == record
+    versions = CodeVersion.of_trials(REPORTS / "blind_injections.jsonl.gz")
+    assert asdict(shipped_record()) == {"releases": list(dict.fromkeys(each.release for each in versions)), **record}
     totals = [record[where][status.value]["total"] for where in ("inside", "outside") for status in Status]
     assert sum(totals) == len(committed) > 100
     hidden_outside = sum(trial.kind == "unknown" for trial in committed)
@@ -253,9 +254,10 @@ def test_a_verdict_is_shown_with_its_record_inside_and_outside_the_catalogue(mon
     inside = {status.value: Share(9, 10) for status in Status} | {"unresolved": Share(0, 0)}
     inside |= {"quiet": Share(20, 20), "loud": Share(7, 8), "misnamed": Share(1, 40)}
     outside = {status.value: Share(2, 3) for status in Status} | {"unresolved": Share(0, 0), "loud": Share(4, 5)}
-    record = Record(inside, outside | {"misnamed": Share(1, 6)})
+    record = Record(["0.2.0", "0.3.0"], inside, outside | {"misnamed": Share(1, 6)})
     monkeypatch.setattr("bayesid.report.verdict_record.shipped_record", lambda: record)
     explained = record_sentence(Status.EXPLAINED)
+    assert explained.startswith("In blind trials of bayesid 0.2.0 and 0.3.0 (95 % intervals in brackets): inside")
     assert "inside the catalogue, 9 of 10 (55 to 100 %) verdicts that explained the data named only" in explained
     assert "outside it, 1 of 6 (0 to 64 %) injections were wrongly explained" in explained
     assert "outside it, 2 of 3 (9 to 99 %) listed something unknown" in record_sentence(Status.AMBIGUOUS)

@@ -1,6 +1,7 @@
 """How often verdicts were right in blind trials whose truth was known.
 
 The counts beside this file are written by the study `blind_injections`, in which MuJoCo hides something in recordings.
+They name the releases that made the trials.
 """
 
 from __future__ import annotations
@@ -55,10 +56,13 @@ class Record:
 
     Attributes
     ----------
+    releases : list of str
+        Releases of this package that made the trials.
     inside, outside : dict of str to Share
         Trials with nothing or causes of the catalogue hidden, and with an effect outside it.
     """
 
+    releases: list[str]
     inside: dict[str, Share]
     outside: dict[str, Share]
 
@@ -68,7 +72,8 @@ def shipped_record() -> Record:
     """Return the counts that come with this version."""
     text = (files("bayesid.report") / COUNTS).read_text(encoding="utf-8")
     counts = json.loads(text)
-    return Record(*({name: Share(**share) for name, share in counts[where].items()} for where in ("inside", "outside")))
+    inside, outside = ({name: Share(**share) for name, share in counts[w].items()} for w in ("inside", "outside"))
+    return Record(counts["releases"], inside, outside)
 
 
 def record_sentence(status: Status) -> str | None:
@@ -96,4 +101,5 @@ def record_sentence(status: Status) -> str | None:
         Status.ADEQUATE: f"without an injection, {inside['quiet']} raised no alarm; of injections of at least seven "
         f"standard deviations, {inside['loud']} inside the catalogue and {outside['loud']} outside it raised one",
     }
-    return f"In blind trials of this method (95 % intervals in brackets): {said[status]}."
+    made_by = " and ".join(record.releases)
+    return f"In blind trials of bayesid {made_by} (95 % intervals in brackets): {said[status]}."

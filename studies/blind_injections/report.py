@@ -21,6 +21,7 @@ from studies.blind_injections.goals import SURE, share_text, surely_misnamed
 from studies.blind_injections.limits import DRAWS
 from studies.blind_injections.trials import ALIKE, Trial, plan, read
 from studies.blind_injections.trials import run as make_trials
+from studies.common.code_version import CodeVersion
 from studies.common.monte_carlo import Workers
 from studies.common.report_parts import add_number_table
 from studies.common.study import MADE, WORKERS, CsvTable, Picture, Report, Setup, Study, Verdict, show
@@ -52,7 +53,8 @@ def run(
     if not done:
         raise ValueError(f"{trials} contains no trials; omit --made to make some")
     if record is not None:
-        write_json(record, goals.record_of(done))
+        releases = dict.fromkeys(version.release for version in CodeVersion.of_trials(trials))
+        write_json(record, {"releases": list(releases), **goals.record_of(done)})
     return Campaign(done, len(plans))
 
 
