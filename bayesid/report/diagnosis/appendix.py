@@ -69,6 +69,10 @@ GLOSSARY = (
         "removed.",
     ),
     ("left-out log score", "Logarithm of the density of a recording under the model fitted to the other recordings."),
+    (
+        "given, prior sd",
+        "Value in the study or robot file, and half the width of the interval with the central 68 % of the prior.",
+    ),
     ("without, with", "Fitted with the present model, and with the named causes added to it."),
 )
 """Terms of the report and their meanings."""
