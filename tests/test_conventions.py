@@ -27,7 +27,7 @@ from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.recordings import Sensors
 from tests.pdf_text import PdfText
 
-QUICK = ("gyro north-east-down", "sign of joint2", "joint1 and joint2 exchanged", "accelerations with gravity")
+QUICK = ("gyro forward-right-down", "sign of joint2", "joint1 and joint2 exchanged", "accelerations with gravity")
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,7 @@ def test_the_stated_attitudes_of_all_recordings_are_put_right(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_a_diagnosis_ends_with_the_convention_and_init_writes_its_remedy(study: Path, tmp_path: Path) -> None:
-    file, output = spoilt(study, "gyro north-east-down", tmp_path), tmp_path / "out"
+    file, output = spoilt(study, "gyro forward-right-down", tmp_path), tmp_path / "out"
     said = " ".join(diagnose_study(Study.load(file), output, 0, None))
     assert "180 degrees about x" in said
     written = json.loads((output / "diagnosis.json").read_text())

@@ -148,13 +148,13 @@ DOWN, LEFT = np.diag([1.0, -1.0, -1.0]), np.diag([1.0, 1.0, -1.0])
 CYCLE = np.roll(np.eye(3), 1, axis=0)
 
 MISTAKES: dict[str, Blunder] = {
-    "gyro north-east-down": Blunder(edited(_in_axes("rate", DOWN)), ("convention:axes:rate",)),
+    "gyro forward-right-down": Blunder(edited(_in_axes("rate", DOWN)), ("convention:axes:rate",)),
     "gyro axes in turn": Blunder(edited(_in_axes("rate", CYCLE)), ("convention:axes:rate",)),
     "gyro left-handed": Blunder(edited(_in_axes("rate", LEFT)), ("convention:axes:rate",)),
-    "accelerometer north-east-down": Blunder(edited(_in_axes("accel", DOWN)), ("convention:axes:accel",)),
+    "accelerometer forward-right-down": Blunder(edited(_in_axes("accel", DOWN)), ("convention:axes:accel",)),
     "accelerometer axes in turn": Blunder(edited(_in_axes("accel", CYCLE)), ("convention:axes:accel",)),
     "accelerometer counted the other way": Blunder(edited(_in_axes("accel", -np.eye(3))), ("convention:axes:accel",)),
-    "both north-east-down": Blunder(
+    "both forward-right-down": Blunder(
         edited(_both(_in_axes("rate", DOWN), _in_axes("accel", DOWN))),
         ("convention:axes:rate", "convention:axes:accel"),
     ),
