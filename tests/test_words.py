@@ -24,7 +24,7 @@ REFUSED = re.compile(
 
 
 # names of cases, by which the stored trials of a campaign know them
-STORED = {"base body, arm known to 5 %", "arm known to 5 %", "rates held", "two arms and a slide"}
+STORED = {"base body, arm known to 5 %", "arm known to 5 %", "two arms and a slide"}
 
 
 def refused(text: str) -> list[str]:

@@ -149,18 +149,20 @@ CYCLE = np.roll(np.eye(3), 1, axis=0)
 
 MISTAKES: dict[str, Blunder] = {
     "gyro forward-right-down": Blunder(edited(_in_axes("rate", DOWN)), ("convention:axes:rate",)),
-    "gyro axes in turn": Blunder(edited(_in_axes("rate", CYCLE)), ("convention:axes:rate",)),
+    "gyro axes permuted": Blunder(edited(_in_axes("rate", CYCLE)), ("convention:axes:rate",)),
     "gyro left-handed": Blunder(edited(_in_axes("rate", LEFT)), ("convention:axes:rate",)),
     "accelerometer forward-right-down": Blunder(edited(_in_axes("accel", DOWN)), ("convention:axes:accel",)),
-    "accelerometer axes in turn": Blunder(edited(_in_axes("accel", CYCLE)), ("convention:axes:accel",)),
-    "accelerometer counted the other way": Blunder(edited(_in_axes("accel", -np.eye(3))), ("convention:axes:accel",)),
+    "accelerometer axes permuted": Blunder(edited(_in_axes("accel", CYCLE)), ("convention:axes:accel",)),
+    "accelerometer axes reversed": Blunder(edited(_in_axes("accel", -np.eye(3))), ("convention:axes:accel",)),
     "both forward-right-down": Blunder(
         edited(_both(_in_axes("rate", DOWN), _in_axes("accel", DOWN))),
         ("convention:axes:rate", "convention:axes:accel"),
     ),
     "sign of joint1": Blunder(edited(_both(_times("position.joint1", -1.0))), ("convention:sign:joint1",)),
     "sign of joint2": Blunder(edited(_times("position.joint2", -1.0)), ("convention:sign:joint2",)),
-    "zero of joint2": Blunder(edited(_times("position.joint2", 1.0, -np.pi / 2)), ("convention:zero:joint2",), 0.2),
+    "zero of joint2 off by 90 degrees": Blunder(
+        edited(_times("position.joint2", 1.0, -np.pi / 2)), ("convention:zero:joint2",), 0.2
+    ),
     "joint1 and joint2 exchanged": Blunder(
         edited(_exchanged("joint1", "joint2")), ("convention:exchanged:joint1,joint2",)
     ),
@@ -176,10 +178,14 @@ MISTAKES: dict[str, Blunder] = {
         edited(_quaternions(lambda q: q * np.array([-1.0, -1.0, -1.0, 1.0])[:, None])),
         ("convention:conjugate:attitude",),
     ),
-    "attitudes to other axes": Blunder(edited(_quaternions(_in_other_axes)), ("convention:frame:attitude",), 0.1),
+    "attitudes relative to another frame": Blunder(
+        edited(_quaternions(_in_other_axes)), ("convention:frame:attitude",), 0.1
+    ),
     "times in milliseconds": Blunder(edited(_times("time", 1e3)), ("convention:unit:time",)),
     "times in nanoseconds since 1970": Blunder(edited(_times("time", 1e9, 1.7e18)), ("convention:unit:time",), 1e-3),
-    "rates held": Blunder(edited(_sparse("rate", 4, lambda rows, seen: seen[rows // 4])), ("convention:held:rate",)),
+    "rates repeated between samples": Blunder(
+        edited(_sparse("rate", 4, lambda rows, seen: seen[rows // 4])), ("convention:held:rate",)
+    ),
     "rates with fill values": Blunder(edited(_filled("rate", 999.0)), ("convention:fill:rate",)),
     "rates three samples late": Blunder(edited(_late("rate.", 3)), ("convention:shift:rate",)),
     "accelerations two samples late": Blunder(edited(_late("accel.", 2)), ("convention:shift:accel",)),
@@ -189,7 +195,7 @@ MISTAKES: dict[str, Blunder] = {
         0.05,  # they are taken to rest before
     ),
     "rates in counts": Blunder(edited(_times("rate.", 9000.0)), ("convention:unit:rate",), 1.0),
-    "a sign and a unit": Blunder(
+    "sign of joint2 and unit of accelerations": Blunder(
         edited(_both(_times("position.joint2", -1.0), _times("accel.", 1e3 / GRAVITY))),
         ("convention:unit:accel", "convention:sign:joint2"),
     ),
