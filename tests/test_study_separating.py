@@ -15,7 +15,7 @@ from studies.common import mission
 from studies.common.study import Verdict
 from studies.separating.analysis import LAST, NEEDED, STAGES, Linearised, PairResult, Realised
 from studies.separating.pairs import ERROR, HAND, LEAK, LINK, PAIRS, PAYLOAD, PULSES
-from studies.separating.report import decided, judged
+from studies.separating.report import _is_full, decided, judged
 
 DURATION = 40.0
 
@@ -129,7 +129,12 @@ def test_realised_rates_are_those_that_the_study_predicts(tmp_path):
     from bayesid.design import Search
     from studies.separating.analysis import run
 
-    options = {"points": 3, "search": Search(starts=1, iterations=2), "flights": 1, "trials": tmp_path / "trials.jsonl"}
+    options = {
+        "points": 3,
+        "search": Search(starts=1, iterations=2),
+        "flights": {"wheel and leak": 1},
+        "trials": tmp_path / "trials.jsonl",
+    }
     result = run(**options)
     (pair,) = result.pairs
     assert pair.designs["separation"].costs["separation"] <= pair.designs["d-optimal"].costs["separation"]
@@ -137,4 +142,4 @@ def test_realised_rates_are_those_that_the_study_predicts(tmp_path):
     assert all(abs(pair.deviation(item, stage)) < 4.0 for item in pair.realised for stage in STAGES)
     stored = (tmp_path / "trials-wheel-and-leak.jsonl").read_text().splitlines()
     assert len(stored) == 1 + 4
-    assert not result.full
+    assert not _is_full(result)

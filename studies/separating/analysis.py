@@ -357,7 +357,6 @@ def realise(
     return rows
 
 
-QUICK_FLIGHTS = 10  # number of sets of flights for each cause and direction in a quick run
 FULL, QUICK = THOROUGH, Search(starts=2, iterations=40)  # effort of each search of a full and of a quick run
 
 
@@ -393,17 +392,15 @@ class Result:
 
     pairs: Sequence[PairResult]
     search: Search  # effort of each search
-    full: bool
 
 
 def run(
     *,
+    flights: Mapping[str, int],
     full: bool = False,
     seed: int = 1,
     points: int = mission.POINTS,
     search: Search | None = None,
-    flights: int | None = None,
-    pairs: Sequence[str] | None = None,
     store: Store | None = None,
     trials: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
@@ -412,16 +409,14 @@ def run(
 
     Parameters
     ----------
+    flights : mapping of str to int; number of sets of flights for each cause and direction, by the names of the pairs
     points : int; number of free control points of every joint
     search : Search, optional; effort of each design
-    flights : int, optional; number of sets of flights for each cause and direction, by default those of each pair in a
-        full run
-    pairs : sequence of str, optional; names of the pairs, by default all in a full run and else the first
     """
     search = search or (FULL if full else QUICK)
-    chosen = [PAIRS[name] for name in (pairs or (list(PAIRS) if full else list(PAIRS)[:1]))]
     store, results = store or Store.forgetful(), []
-    for pair in chosen:
+    for name, count in flights.items():
+        pair = PAIRS[name]
         problem, designs = design_both(separating_problem(pair, points), seed, search, store, progress)
         motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
         motions |= {name: design.motion for name, design in designs.items()}
@@ -430,8 +425,6 @@ def run(
         kept = (
             None if trials is None else trials.with_name(f"{trials.stem}-{pair.name.replace(' ', '-')}{trials.suffix}")
         )
-        count = flights or (pair.flights if full else QUICK_FLIGHTS)
         realised = realise(pair, weighing, motions, known, count, seed, kept, progress)
         results.append(PairResult(pair, designs, motions, predicted, realised))
-    whole = len(chosen) == len(PAIRS) and all((flights or pair.flights) >= pair.flights for pair in chosen)
-    return Result(results, search, full and whole)
+    return Result(results, search)

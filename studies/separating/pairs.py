@@ -49,7 +49,6 @@ class Pair:
 
     name: str
     causes: tuple[Cause, Cause]
-    flights: int = 100  # number of sets of flights for each cause and direction in a full run
 
     @property
     def labels(self) -> tuple[str, str]:
@@ -128,7 +127,7 @@ ERROR = Cause(
 PAIRS: Mapping[str, Pair] = {
     pair.name: pair
     for pair in (
-        Pair("wheel and leak", (WHEEL, LEAK), flights=400),
+        Pair("wheel and leak", (WHEEL, LEAK)),
         Pair("leak and pulses", (LEAK, PULSES)),
         Pair("wheel and dipole", (WHEEL, DIPOLE)),
         Pair("payload and link error", (PAYLOAD, ERROR)),
