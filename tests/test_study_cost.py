@@ -25,11 +25,19 @@ def timed(verdict: float, memory: float = 1.2, sample: float = 0.0) -> Run:
 
 
 def made_up(nested: Nested | None) -> Cost:
-    titles = ("nothing", "leak", "payload", "link", "wheel and bias", "growing torque", "swinging torque")
-    warm = {"nothing": 0.1, "leak": 0.15}
+    titles = (
+        "nothing hidden",
+        "leak",
+        "payload",
+        "link error",
+        "wheel and bias",
+        "growing torque",
+        "oscillating torque",
+    )
+    warm = {"nothing hidden": 0.1, "leak": 0.15}
     return Cost(
         diagnoses={name: [timed(16.0), *(timed(warm.get(name, 4.0) + 0.01 * k) for k in range(3))] for name in titles},
-        sampled={name: timed(0.1, sample=8.0 + k) for k, name in enumerate(("leak", "payload", "link"))},
+        sampled={name: timed(0.1, sample=8.0 + k) for k, name in enumerate(("leak", "payload", "link error"))},
         commands={
             "check": [Run(20.0, 20.0, 0.6, {}), Run(5.0, 5.0, 0.5, {})],
             "identify": [Run(40.0, 60.0, 1.0, {}), Run(19.0, 25.0, 1.0, {}), Run(21.0, 25.0, 1.0, {})],
@@ -65,7 +73,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
         Verdict.FAIL,  # 2.4 GB
         Verdict.PASS,
     ], verdicts
-    assert goals[2].text.endswith("at most 40 s for wheel and bias, growing torque, swinging torque")
+    assert goals[2].text.endswith("at most 40 s for wheel and bias, growing torque, oscillating torque")
     assert goals[-2].reached == "9 s, 0.5 GB; 35 s, 2.4 GB"
     within = replace(cost, large={**cost.large, "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=1.9)]})
     assert goals_of(within)[-2].verdict is Verdict.PASS
@@ -122,8 +130,8 @@ def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
 def test_a_small_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XLA_FLAGS", QUICKLY)  # of the commands, in processes of their own
     monkeypatch.setattr("studies.cost.run.COUNTS", (4,))
-    cost = run(titles=("nothing",), commands=())
-    cold, warm = cost.diagnoses["nothing"]
+    cost = run(titles=("nothing hidden",), commands=())
+    cold, warm = cost.diagnoses["nothing hidden"]
     assert cold.wall > cold.to_verdict > 0.0
     assert warm.phases["compile"] < cold.phases["compile"]
     assert 0.3 < warm.memory < 8.0

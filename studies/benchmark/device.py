@@ -146,17 +146,20 @@ def add_device(document: Document, measured: DeviceTimes | None, evaluation: flo
         document.paragraph(
             f"This machine has no accelerator, so nothing was tested here; the figures are those of an {last.name}, "
             f"{last.date}. There, 65536 points in one call exceeded 80 GB. Calls are now sized to the memory of the "
-            "device; the tables of the composite body at all nodes and samples take most of it."
+            "device; most of it is taken by intermediate results for every sample."
         )
     rows = [
         [str(batch), format_number(1e6 * seconds, 3), format_number(3.0 / seconds, 3)]
         for batch, seconds in last.per_point.items()
     ]
-    rows.append(["this machine's processor", format_number(3e6 * evaluation, 3), format_number(1.0 / evaluation, 3)])
+    rows.append(
+        ["one, on this machine's processor", format_number(3e6 * evaluation, 3), format_number(1.0 / evaluation, 3)]
+    )
     document.table(
         ["points per call", "time of a point [µs]", "simulations per second"],
         rows,
-        f"Points of three recordings of 120 s on {last.name}, and three of one recording on this machine.",
+        f"Time of a point, which is one evaluation of the posterior of three recordings of 120 s, on {last.name}; on "
+        "this machine it is three times the time with one recording.",
         columns("lrr"),
     )
     document.table(

@@ -114,10 +114,11 @@ def _report(result: Result) -> Report[Result]:
     return Report(
         title="Benchmark",
         subtitle="Cost of simulations and of effective samples",
-        question="How much time does one simulation take compared with other simulators at the same accuracy, how does "
-        "that depend on the problem, and how much time does an effective sample take?",
-        answer=f"One evaluation takes {_spread(1e6 * evaluations)} µs, {_spread(ratios[0])} times less than MuJoCo's "
-        f"rollouts in C. It is that of ETS-VII with {EVALUATED}.",
+        question="How much time does one evaluation, a simulation with its likelihood, take compared with other "
+        "simulators at the same accuracy, how does that depend on the problem, and how much time does an effective "
+        "sample take?",
+        answer=f"One evaluation of the log likelihood takes {_spread(1e6 * evaluations)} µs; MuJoCo's rollouts in C "
+        f"take {_spread(ratios[0])} times as long. Case: ETS-VII with {EVALUATED}.",
         goals=goals_of(runs),
         valid=f"run on {processor()}. Between runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
@@ -168,7 +169,7 @@ def _simulations(document: Document, result: Result) -> None:
         first = next(iter(times[0]))
         rows += [
             [
-                format_text(f"{key} {title}".strip()),
+                format_text(f"{'joints exact' if key == 'white' else key} {title}".strip()),
                 _spread(np.array([1e6 * seconds[key] for seconds in times])),
                 _spread(np.array([seconds[key] / seconds[first] for seconds in times])),
             ]

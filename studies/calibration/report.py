@@ -119,7 +119,7 @@ def _coverage_goal(cases: Sequence[Replicates]) -> Goal:
 
 def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
     """Return the goal on emcee where the arm is unknown, which is judged like the others once it is run there."""
-    text = f"ranks uniform (corrected p above {FAMILYWISE:g}), emcee: unknown arm and whole system"
+    text = f"ranks uniform (corrected p above {FAMILYWISE:g}), emcee: arm uncertain by 5 % and whole system"
     p_values = {
         (runs.case, name): replicate.uniform_p_value(ranks)
         for runs in cases
@@ -159,10 +159,14 @@ def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
     made, planned = sum(len(runs.results) for runs in cases), sum(REPLICATES.values())
     share, error = pooled_coverage([runs.bodies() for runs in cases if runs.results], LEVELS[-1])
     wrong = [p for p in corrected.values() if p <= FAMILYWISE]
-    said = f"{len(wrong)} ranks contradict uniformity" if wrong else "No rank contradicts uniformity"
+    said = (
+        f"{len(wrong)} of the {len(corrected)} distributions of ranks depart from uniformity"
+        if wrong
+        else f"None of the {len(corrected)} distributions of ranks departs from uniformity"
+    )
     return Report(
-        title="Calibration",
-        subtitle="Coverage of the posterior's intervals",
+        title="Calibration of the posterior",
+        subtitle="Do the stated intervals contain the truth as often as stated?",
         question="Does the truth lie within the stated intervals as often as stated, through the whole chain?",
         answer=f"{_percent(share, error)} % of the bodies' true values lie within their {format_percent(LEVELS[-1])} "
         f"intervals ({made:,} replicates). {said}."
@@ -195,8 +199,8 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
     return Setup(
         robot="ETS-VII, alone or with a load, and a planar robot on a table.",
         manoeuvre="Random motion of all joints for 120 s, from a random attitude and initial rate (10⁻³ rad/s).",
-        sensors="Every 0.5 s rates with 10⁻⁵ rad/s, accelerations with 10⁻⁵ m/s² and an unknown constant error of 10⁻⁴ "
-        "m/s², joint positions with 10⁻⁶ rad.",
+        sensors="White noise (1 sigma) at a sampling interval of 0.5 s: rates 10⁻⁵ rad/s, accelerations 10⁻⁵ m/s² with "
+        "an unknown constant error of 10⁻⁴ m/s² (1 sigma), joint positions 10⁻⁶ rad.",
         known="The orbit with its gravity gradient, the attitude at the start, the sensors' noise.",
         unknown=f"Log-Cholesky coordinates of width {BASE_SPREAD:g} for base and load (mass uncertain by a factor of "
         f"1.8), {ARM_SPREAD:g} for an arm with masses uncertain by 5 % (1 sigma), {DRAWINGS_SPREAD:g} for links where "
@@ -217,16 +221,15 @@ def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
         "Chi-square is that of the data at the truth, so its mean is one if the stated covariance is right. It is "
         "below one if the noise propagated from the encoders is overstated, above one if it is understated. The second "
         "table, for exactly known joint motions, explains why both occur. The smoothing models a motion as a five-fold "
-        "integral of white noise, the smoothest that its algebra allows. Real robot motions are smoother: of the "
-        "stated variance of position, speed and acceleration the shares "
-        f"{', '.join(f'{1.0 - smooth_share(order):.1f}' for order in range(3))} are roughness that such motions do not "
-        "have, whatever the sampling and the encoder, provided that the encoder's noise and not the interval limits "
-        f"the smoothing. The resulting ratios are {', '.join(f'{smooth_share(order):.1f}' for order in range(3))}, and "
-        "the chi-square of a sensor whose errors are mostly propagated accelerations can fall to one half. Within a "
-        f"second of the ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is "
-        f"{sharp.min():.1f} to {sharp.max():.1f} times the stated one: jumps that the samples reveal are unknowns of "
-        "the process, but a single joint, as here, does not reveal all of them. Both effects are small in a sensor "
-        "whose noise is as large as the propagated one."
+        "integral of white noise, the smoothest that its algebra allows. For real robot motions, which are smoother, "
+        "the mean squared errors of position, speed and acceleration are "
+        f"{joined(f'{smooth_share(order):.1f}' for order in range(3))} times the stated variances, as long as encoder "
+        "noise and not the sampling interval limits the smoothing. The chi-square of a sensor whose errors are mostly "
+        "propagated accelerations can then fall to one half, and further where the interval limits the smoothing (the "
+        "longest in the table). Within a second of the ends of quintic ramps, where the jerk jumps, the actual error "
+        f"of the acceleration is {sharp.min():.1f} to {sharp.max():.1f} times the stated one: jumps that the samples "
+        "reveal are unknowns of the process, but a single joint, as here, does not reveal all of them. Both effects "
+        "are small in a sensor whose noise is as large as the propagated one."
     )
     add_number_table(
         document,
@@ -258,8 +261,8 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
     sentences = [
         f"Not uniform at {100.0 * FAMILYWISE:g} % family-wise: " + "; ".join(wrong) + "."
         if wrong
-        else f"None of {len(corrected)} ranks contradicts uniformity at {100.0 * FAMILYWISE:g} % family-wise. With few "
-        "replicates this is weak evidence: see the width of the bands."
+        else f"None of the {len(corrected)} distributions of ranks departs from uniformity at {100.0 * FAMILYWISE:g} % "
+        "family-wise. With few replicates this is weak evidence: see the width of the bands."
     ]
     for title, chosen in (("data generated by the package", False), ("data generated by MuJoCo", True)):
         ranks = [runs.bodies() for runs in cases if (runs.case in INDEPENDENT) is chosen and len(runs.results)]
@@ -283,7 +286,7 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
     document.items(sentences)
     add_number_table(
         document,
-        ["case", "planned", "made", "smallest corrected p", "of"],
+        ["case", "planned", "made", "smallest corrected p", "unknown with that p"],
         [
             [
                 runs.case.label,
@@ -302,8 +305,9 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
         HEADER,
         [row for row in _coverage_rows(cases) if row[0].endswith(f": {Method.IMPORTANCE}") or row[0].startswith(ALL)],
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
-        "intervals, with the standard error over replicates. Emcee samples one replicate in twenty, and none of the "
-        "whole system. Results of Laplace and emcee for each case are in calibration-coverage.csv.",
+        "intervals, with the standard error over replicates. Emcee samples one replicate in twenty, too few to reveal "
+        "more than gross errors, and none of the whole system, whose goal therefore stays open. Results of Laplace and "
+        "emcee for each case are in calibration-coverage.csv.",
     )
 
 
@@ -335,9 +339,9 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     if shifts:
         sentences.append(
             "The initial rate in a posterior is not the true rate of the base, but the one that matches the smoothed "
-            "joints: an error of a smoothed joint speed at time 0 shifts it, and its stated interval excludes this "
-            f"shift. Root mean square of the difference in stated standard deviations: {shifts}. Ranks and coverage "
-            "here refer to the rate as the posterior defines it; the bodies are the same in both definitions."
+            "joints: an error of a smoothed joint speed at time 0 shifts it, and its stated interval does not account "
+            f"for this shift. Root mean square of the difference in stated standard deviations: {shifts}. Ranks and "
+            "coverage here refer to the rate as the posterior defines it; the bodies are the same in both definitions."
         )
     document.items(sentences)
 

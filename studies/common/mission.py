@@ -56,8 +56,8 @@ TRUTH_STEP = 0.5  # integration step of MuJoCo [s]; rates then differ by 5e-12 r
 
 # the sensors in words, for the setup of a report
 SENSORS = (
-    f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} m/s² and "
-    f"encoders with {format_number(ENCODER)} rad of white noise"
+    f"White noise (1 sigma) at a sampling interval of {INTERVAL:g} s: rates {format_number(RATE)} rad/s, accelerations "
+    f"{format_number(ACCEL)} m/s², encoders {format_number(ENCODER)} rad"
 )
 
 

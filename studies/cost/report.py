@@ -71,7 +71,7 @@ def _times(cost: Cost, code: str, limits: Collection[float]) -> Goal | None:
             verdicts += [Verdict.between(min(values), max(values), most=limit) for values in each.values()]
     if not texts:
         return None
-    kind = "cold" if code == "cold" else "with cached compiled code"
+    kind = "without cached compiled code" if code == "cold" else "with cached compiled code"
     text = f"Files to verdict, {kind}: {'; '.join(texts)}"
     return Goal(text, ", ".join(told), Verdict.all_of(verdicts), Severity.LOW)
 
@@ -92,7 +92,7 @@ def _large_goal(large: Mapping[str, list[Run]]) -> Goal | None:
             verdicts.append(Verdict.of(seconds <= row.seconds and warm.memory <= row.memory))
     if not texts:
         return None
-    text = f"Much data, with cached compiled code, at most: {'; '.join(texts)}"
+    text = f"Large data sets, with cached compiled code, at most: {'; '.join(texts)}"
     return Goal(text, "; ".join(told), Verdict.all_of(verdicts), Severity.LOW)
 
 
@@ -143,8 +143,7 @@ def _report(cost: Cost) -> Report[Cost]:
         f"code.{_limits_text(warm)} "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
         goals=goals,
-        valid=f"run on {processor()}, two cores, with no other load. The machine's speed varies by a third from day to "
-        "day.",
+        valid=f"run on {processor()}, with no other load. The machine's speed varies by a third from day to day.",
         full=cost.full,
         figure=Picture(
             phases_figure(cost),
@@ -153,7 +152,8 @@ def _report(cost: Cost) -> Report[Cost]:
         ),
         setup=Setup(
             robot="A servicer with three joints where files are timed; ETS-VII and chains of links for evaluations.",
-            manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight rule: only times count.",
+            manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight rule permits: only times "
+            "count.",
             sensors="Rate and accelerometer at 4 Hz and encoders, written to files by MuJoCo.",
             known="Links, orbit and sensors, as stated in the study files.",
             unknown="Base and initial rates, and the hidden cause.",
@@ -183,8 +183,8 @@ def _limits_text(warm: Mapping[str, float]) -> str:
     for limit in sorted({case.warm for case in DIAGNOSES if case.title in warm}):
         times = {case.title: warm[case.title] for case in DIAGNOSES if case.title in warm and case.warm == limit}
         late = sum(value > limit for value in times.values())
-        parts.append(f"{limit:g} s ({joined(times)}), missed by {late} of {len(times)}")
-    return f" The limits are {joined(parts)}." if parts else ""
+        parts.append(f" The limit of {limit:g} s ({joined(times)}) is missed in {late} of {len(times)} cases.")
+    return "".join(parts)
 
 
 def _phases(document: Document, cost: Cost) -> None:
@@ -214,10 +214,10 @@ def _phases(document: Document, cost: Cost) -> None:
     unsaid = f" The files of {joined(silent)} state no time by phase." if silent else ""
     if rows:
         document.table(
-            ["command", "cold [s]", "warm", "memory [GB]", "phases, warm [s]"],
+            ["command", "without [s]", "with cached code [s]", "memory [GB]", "phases, with cached code [s]"],
             rows,
-            "Other commands on the recordings with nothing hidden, from files to report; design with its default "
-            f"settings.{unsaid}",
+            "Other commands on the recordings with nothing hidden, from files to report, without and with cached "
+            f"compiled code; design with its default settings.{unsaid}",
             columns("lrrrl"),
         )
 

@@ -47,13 +47,13 @@ class Diagnosed(NamedTuple):
 
 # single causes within 5 s, cold 20 s; pairs and what nobody listed within twice that
 DIAGNOSES = (
-    Diagnosed("nothing", "null, three joints", 5.0, 20.0),
+    Diagnosed("nothing hidden", "null, three joints", 5.0, 20.0),
     Diagnosed("leak", "thruster-leak", 5.0, 20.0),
     Diagnosed("payload", "payload:link3", 5.0, 20.0),
-    Diagnosed("link", "link-inertia:link2", 5.0, 20.0),
+    Diagnosed("link error", "link-inertia:link2", 5.0, 20.0),
     Diagnosed("wheel and bias", "wheel-momentum, accel-bias", 10.0, 40.0),
     Diagnosed("growing torque", "growing-torque", 10.0, 40.0),
-    Diagnosed("swinging torque", "swinging-torque", 10.0, 40.0),
+    Diagnosed("oscillating torque", "swinging-torque", 10.0, 40.0),
 )
 
 
@@ -303,7 +303,7 @@ def nested(diagnosis: Diagnosis, limit: float, seed: int) -> Nested | None:
 
 
 REPEATS = 3  # number of runs with compiled code kept, after the one without
-SAMPLED = ("leak", "payload", "link")  # diagnoses after which the extended model is sampled, by their titles
+SAMPLED = ("leak", "payload", "link error")  # diagnoses after which the extended model is sampled, by their titles
 TITLES = tuple(case.title for case in DIAGNOSES)  # titles of all diagnoses that are timed
 COUNTS = (10, 20, 40, 1000)  # numbers of candidates of the catalogue; the last one takes all
 LIMIT = 600.0  # time at which a nested sampler is stopped [s]

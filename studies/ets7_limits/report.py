@@ -68,11 +68,12 @@ def _report(result: Result) -> Report[Result]:
         subtitle="Within 50 mm/s and 5 degrees per second at the tip",
         question="How long must the arm move within the flight rule until mass and moments of inertia of the base "
         "are determined to 1 %, and with which sensors?",
-        answer=f"At least {format_percent(_least(result), 2)} uncertainty remains with an arm uncertain by 5 % (1 "
-        "sigma), whatever the time, rate sensor and accelerometer. Motion alone takes the scale from the arm's mass; "
-        "measured joint torques or a known thrust would provide it. With the arm known exactly one manoeuvre of "
-        f"{mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with sensors of "
-        "10⁻⁵ rad/s and 10⁻⁵ m/s².",
+        answer="With each link's mass uncertain by 5 % (1 sigma), the least well determined of the base's mass and "
+        f"moments of inertia stays uncertain by at least {format_percent(_least(result), 2)}, however long the arm "
+        "moves and whatever rate sensor and accelerometer are used. Motion determines masses only relative to the "
+        "arm's; an absolute scale needs joint torques or a known thrust. With the arm known exactly one manoeuvre of "
+        f"{mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with sensors of 10⁻⁵ "
+        "rad/s and 10⁻⁵ m/s².",
         goals=goals(result),
         valid="wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
         "and noise is white. Every repetition starts at a new unknown rate; bias and arm stay the same.",
@@ -91,10 +92,12 @@ def _report(result: Result) -> Report[Result]:
             f"{end - begin:g} s each, {again - end:g} s apart, with corners rounded over {CORNER:g} s.",
             sensors=f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
             f"{format_number(ENCODER)} rad. Those of the mission have {format_number(RATE)} rad/s and "
-            f"{format_number(ACCEL)} m/s². The star tracker's 2 seconds of arc are differenced and treated as white.",
+            f"{format_number(ACCEL)} m/s². The star tracker's attitude (2 seconds of arc) is differentiated and its "
+            "noise treated as white.",
             known="Gravity gradient, attitude at the start, and the arm: each link's mass uncertain by 5 % (1 sigma), "
             "or exact.",
-            unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
+            unknown=f"The base, the rate at the start, and the accelerometer's bias ({format_number(BIAS)} m/s², 1 "
+            "sigma).",
             replicates="Standard deviations to first order; those above some 30 % are rough.",
         ),
         outline=robot_outline(ets7(), START),
@@ -190,12 +193,14 @@ def _statements(result: Result) -> list[Statement]:
     once = cells[star][True, False].once if star in cells else float("nan")
     return [
         Statement(
-            "Rates to 2 seconds of arc and accelerations to 10⁻⁵ to 10⁻⁹ m/s² are available (4.3).",
+            "Attitudes to 2 seconds of arc and accelerations to 10⁻⁵ to 10⁻⁹ m/s² can be measured (4.3).",
             Finding.REFUTED if once > 0.02 else Finding.CONFIRMED,
-            f"Tested as sufficient for the 2 % that the paper names, with the arm exact. {'; '.join(reasons)}.",
+            "Whether they can be bought was not tested. With the arm known exactly they suffice for the 2 % that the "
+            f"paper names. {'; '.join(reasons)}.",
         ),
         Statement(
-            "The base's mass is identified to 0.01 % with a given arm, which CAD data know to 5 % (1 and 4.1).",
+            "The base's mass is identified to 0.01 % with a given arm, whose masses are known from CAD data to 5 % (1 "
+            "and 4.1).",
             Finding.REFUTED,
             f"With each link's mass uncertain by 5 %, the base's is uncertain by {format_percent(_least(result), 2)}, "
             "whatever the rate sensor and the accelerometer.",

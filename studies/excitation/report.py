@@ -39,10 +39,10 @@ from studies.excitation.search import FULL, QUICK, Contest, Crowd, Result, run
 
 # titles of the manoeuvres
 TITLES = {
-    "printed": "the paper's optimum, as printed",
-    "poor": "its poor neighbour",
-    "paper-26": "(26) as printed",
-    "paper-26-intended": "(26) as intended",
+    "printed": "the paper's manoeuvre",
+    "poor": "the paper's weaker variant",
+    "paper-26": "best by Eq. (26) as printed",
+    "paper-26-intended": "best by Eq. (26), corrected",
     "condition-number": "condition number",
     "d-optimal": "d-optimal",
     "a-optimal": "a-optimal",
@@ -152,7 +152,10 @@ def scale_error(realised: Realised) -> float:
 
 def _robots_goal(starts: str, result: Result) -> Goal:
     """Return whether a thorough search ends as low as the best of many descents, on all robots."""
-    text = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {starts}, per parameter"
+    text = (
+        f"On each of {ROBOTS} robots a thorough search is at most {format_percent(ALIKE)} worse (sd per parameter) "
+        f"than the best of {starts}"
+    )
     crowd = result.crowds.get("d-optimal")
     if crowd is None or result.searches is None or not result.rivals:
         return Goal(text, "not run", Verdict.NOT_TESTED, Severity.MEDIUM)
@@ -183,8 +186,8 @@ def _best_known(result: Result, crowd: Crowd) -> float:
 def _largest_goal(starts: str, result: Result) -> Goal:
     """Return whether several searches, each followed to its end, reach the best known: else more may be possible."""
     text = (
-        f"Largest factor over (26) from {starts}; {SEVERAL} completed searches within {format_percent(ALIKE)} of the "
-        "best known"
+        f"At least {SEVERAL} searches that are run to convergence end within {format_percent(ALIKE)} (sd per "
+        f"parameter) of the best manoeuvre known, {starts} among them"
     )
     crowd = result.crowds.get("d-optimal")
     if crowd is None:
@@ -195,8 +198,8 @@ def _largest_goal(starts: str, result: Result) -> Goal:
     within = int((np.expm1((followed - _best_known(result, crowd)) / PARAMETERS) <= ALIKE).sum())
     count = len(crowd.costs)
     reached = (
-        f"{_largest(result.contest)} from {count} starts; {within} of {len(followed)} completed searches within "
-        f"{format_percent(ALIKE)} of the best known"
+        f"{within} of {len(followed)}; largest factor over the optimum of Eq. (26): {_largest(result.contest)}, from "
+        f"{count} starts"
     )
     verdict = Verdict.PASS if within >= SEVERAL and count >= STARTS else Verdict.OPEN
     return Goal(text, reached, verdict, Severity.MEDIUM)
@@ -213,9 +216,9 @@ def near(result: Result) -> str:
     usual = np.expm1((crowd.expected(USUAL) - best) / PARAMETERS)
     within = int((worse <= ALIKE).sum())
     return (
-        f"Thorough searches by d-optimality end {format_percent(worse.mean(), 2)} above the best known per parameter "
-        f"in the mean of {len(costs)}, {within} of them within {format_percent(ALIKE)}; first descents from {USUAL} "
-        f"starts, {format_percent(usual, 2)}."
+        f"Thorough searches by d-optimality end with a sd per parameter {format_percent(worse.mean(), 2)} above the "
+        f"best known, on average over {len(costs)}, {within} of them within {format_percent(ALIKE)}; first descents "
+        f"from {USUAL} starts, {format_percent(usual, 2)}."
     )
 
 
@@ -233,10 +236,10 @@ def _report(result: Result) -> Report[Result]:
         title="The most informative manoeuvre for the base",
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
-        answer=f"The d-optimal manoeuvre gives {factors[HEADLINE]:.2f} times smaller standard deviations of the base "
-        f"than the best condition number. That is their geometric mean, with the {ARMS[HEADLINE]}. That of the mass "
-        f"alone, whose scale comes from the arm, is {_of_mass(contest):.2f} times smaller. With the {ARMS[IDEAL]} the "
-        f"geometric mean is {factors[IDEAL]:.2f} times smaller; {_starts(result)}.",
+        answer="Compared with the manoeuvre of the best condition number, the d-optimal manoeuvre reduces the "
+        f"geometric mean of the base's ten standard deviations by a factor of {factors[HEADLINE]:.2f} "
+        f"({ARMS[HEADLINE]}) or {factors[IDEAL]:.2f} ({ARMS[IDEAL]}). The standard deviation of the mass alone, which "
+        f"is limited by the arm, falls by a factor of {_of_mass(contest):.2f}; {_starts(result)}.",
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
         "gradient acts.",
@@ -255,13 +258,14 @@ def _report(result: Result) -> Report[Result]:
         setup=Setup(
             robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
             manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight rule "
-            f"allows. The paper's optimum had to be reduced to {format_percent(shrink['printed'], 2)} of its "
-            f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
+            f"allows. The paper's manoeuvre (coefficients of section 4.1) had to be reduced to "
+            f"{format_percent(shrink['printed'], 2)} of its amplitudes, and its weaker variant to "
+            f"{format_percent(shrink['poor'], 2)}.",
             sensors=f"{mission.SENSORS}; the encoders' noise is part of every criterion.",
             known="The gravity gradient, the attitude at the start, and the arm with each link's mass uncertain by 5 % "
             "(1 sigma).",
             unknown="The base (mass uncertain by a factor of e², 1 sigma), the rate at the start, the accelerometer's "
-            f"bias within {format_number(BIAS)} m/s², and the links, which are marginalised.",
+            f"bias ({format_number(BIAS)} m/s², 1 sigma), and the links, which are marginalised.",
             replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
             f"criterion{_crowds(result)}; {_flights(result)}, each with a separate draw of arm, bias and noise. "
             "Times of searches are in the report on cost.",
@@ -347,8 +351,8 @@ def _evidence(document: Document, result: Result) -> None:
         _cloud_figure(result),
         "Information (minus half the log-determinant of the covariance of the base's coordinates, arm uncertain by "
         f"5 %) of {len(result.cloud.motion)} random manoeuvres, each scaled at random within the largest that "
-        "satisfies the rule, against (26) in both readings and against the plain sum of the squared largest excursions "
-        "(m² and rad²).",
+        "satisfies the rule, against (26) in both readings and against the sum of the squared largest excursions, "
+        "added in SI units without weights.",
     )
     drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
     document.figure(
@@ -375,7 +379,10 @@ def _calibration(document: Document, result: Result) -> None:
         )
     add_number_table(
         document,
-        ["manoeuvre", "flights", "all directions", "each", "p", "error", "beyond", "last step [sd]"],
+        [
+            *("manoeuvre", "flights", "ratio, all directions", "ratio, single directions", "p of covariance"),
+            *("standard error of one ratio", f"parameters off by > {format_percent(WITHIN)}", "last step [sd]"),
+        ],
         [[cell or "none" for cell in row] for row in rows],
         "Flights in MuJoCo: realised over predicted sd of ten independent directions together and of each, p-value of "
         "their covariance, standard error of one ratio, and parameters whose realised error is not within "
@@ -498,12 +505,14 @@ def _crowd_figure(result: Result) -> Figure:
 def _cloud_figure(result: Result) -> Figure:
     cloud = result.cloud
     figure = wide_figure(1.65)
-    titles = ("(26) as printed", "(26) as intended", "sum of squared excursions")
+    titles = ("Eq. (26) as printed", "Eq. (26), corrected", "sum of squared excursions")
     panels = figure.subplots(1, 3, sharey=True)
-    for axes, title, values in zip(panels, titles, (cloud.printed, cloud.intended, cloud.motion), strict=True):
+    units = ("", "", " m², rad²")
+    clouds = (cloud.printed, cloud.intended, cloud.motion)
+    for axes, title, unit, values in zip(panels, titles, units, clouds, strict=True):
         axes.plot(1e3 * values, cloud.information, ".", color=COLOURS[0], markersize=3)
         axes.set_title(f"rank correlation {format_fixed(cloud.correlation(values)[0], 2)}")
-        axes.set_xlabel(f"{title} [10⁻³]")
+        axes.set_xlabel(f"{title} [10⁻³{unit}]")
     panels[0].set_ylabel("information [nats]")
     return figure
 

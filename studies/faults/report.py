@@ -22,6 +22,7 @@ from bayesid._io.words import counted, joined
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from bayesid.report.numbers import format_percent
 from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.common.report_parts import add_number_table
 from studies.common.study import MADE, TRIALS, Goal, Picture, Report, Severity, Study, Verdict, show
@@ -100,6 +101,15 @@ def _spoil(seed: int, changes: int, study: Path, folder: Path) -> dict[str, Any]
     return {"answers": {kind: dict(counts) for kind, counts in answers.items()}, "faults": faults}
 
 
+# what was done to a file, by the kind of its change
+CHANGES = dict(
+    zip(
+        KINDS,
+        ("value replaced", "text inserted", "file truncated", "line dropped", "line repeated", "byte changed"),
+        strict=True,
+    )
+)
+
 # titles of the outcomes by their keys
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
 
@@ -167,8 +177,8 @@ def _report(result: Result) -> Report[Result]:
     numbers, units, killed = result.numbers, result.by("unit"), result.by("kill")
     caption = "Outcome of the corrupted files, by kind of change."
     return Report(
-        title="Faults",
-        subtitle="Corrupted files, wrong units, kills at random times",
+        title="Robustness",
+        subtitle="Corrupted files, wrong units, interruptions, full disks and faulty plug-ins",
         question="How do commands respond to corrupted files, wrong units and kills at random times?",
         answer=f"{numbers['faulty']} of {counted(sum(numbers.values()), 'corrupted file')} got an unclear answer. "
         f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
@@ -218,7 +228,7 @@ def _kills(document: Document, result: Result) -> None:
 def _said(document: Document, result: Result) -> None:
     for key, good, section, title, caption in (
         ("unit", "noticed", "Wrong units", "unit", "Messages of the command check for wrong units."),
-        ("around", "refused", "Faults around a run", "fault", "Messages of commands for faults around a run."),
+        ("around", "refused", "Full disk, locked folders and faulty plug-ins", "fault", "Messages of commands."),
     ):
         said = [[name, "yes" if i[good] else "no", _short(i["said"])] for name, i in result.by(key).items()]
         if said:
@@ -231,7 +241,9 @@ def _conditions(document: Document, result: Result) -> None:
     document.paragraph(
         "MuJoCo generates the files. Hypothesis draws the corruption of a file: one value is replaced, text is "
         "inserted, the end is cut off, a line is dropped or repeated, or a byte is changed. The file counts as refused "
-        "if the exit status is 2, one message begins with Error, nothing is written and Python gives no warning. A "
+        "if the exit status is 2, one message begins with Error, nothing is written and Python gives no warning. It "
+        "counts as accepted if it can still be read and every value is permitted, such as a changed digit; the trial "
+        "ends after reading, so that later checks of the data are not tested. A "
         "wrong unit counts as noticed if check refuses it in this way or names it as a convention. The "
         "full disk has a capacity of 16 kB. The other version, whose cache an identification reads, computes a "
         "gravity-gradient torque a hundred times as large."
@@ -253,13 +265,14 @@ def _goals(result: Result) -> list[Goal]:
         ),
         (
             "No wrong unit passes unnoticed",
-            f"{len(noticed)} of {len(units)} refused or named, {stated} with the unit for the study",
+            f"{len(noticed)} of {len(units)} refused or named; {stated} of the messages give the line to add to the "
+            "study file",
             len(noticed) == len(units),
             len(units) == len(SLIPS),
         ),
         (
             "No partly written file after a kill",
-            f"{counted(len(broken), 'file')} after {counted(kills, 'kill')}",
+            f"{counted(len(broken), 'file')} after {counted(kills, 'kill')}{_at_most(len(broken), kills)}",
             not broken,
             kills > 0,
         ),
@@ -289,7 +302,7 @@ def _resumed(killed: Mapping[str, Made]) -> Goal:
 
 def _refused(around: Mapping[str, Made]) -> Goal:
     """Return the goal on the errors for faults around a run."""
-    text = f"One clear error: {joined(SURROUNDINGS)}"
+    text = f"Each of these gives exactly one clear error message: {joined(SURROUNDINGS)}"
     verdicts = {title: Verdict.of(around[title]["refused"] if title in around else None) for title in SURROUNDINGS}
     count = list(verdicts.values()).count(Verdict.PASS)
     parts = [f"{count} of {len(verdicts)}"] + [
@@ -312,9 +325,16 @@ def _unmoved(task: Made | None) -> Goal:
     if not task["differs"]:
         reached = "not decisive: the other version gives the same result"
         return Goal(text, reached, Verdict.NOT_TESTED, Severity.HIGH)
-    same = "same result as" if task["same"] else "different result than"
+    same = "the same result as" if task["same"] else "a result that differs from that"
     reached = f"{same} with an empty cache; the other version gives another result"
     return Goal(text, reached, Verdict.of(task["same"]), Severity.HIGH)
+
+
+def _at_most(count: int, total: int) -> str:
+    """Return how often something may still happen that never did, for a goal; nothing where it did."""
+    if count or not total:
+        return ""
+    return f" (with 95 % confidence in at most {format_percent(1.0 - 0.05 ** (1.0 / total), 2)} of kills)"
 
 
 def _short(said: str) -> str:
@@ -335,7 +355,7 @@ def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
         axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
         left = left + counts
     axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))
-    axes.set_yticks(place, list(answers))
+    axes.set_yticks(place, [CHANGES[kind] for kind in answers])
     shared_legend(figure, axes, len(OUTCOMES))
     return figure
 

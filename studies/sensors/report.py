@@ -73,7 +73,8 @@ def _report(result: Result) -> Report[Result]:
             "on the base body).",
             sensors=f"Rates, accelerometer at {ACCELEROMETER} m and encoders, white noise every {INTERVAL:g} s. The "
             f"paper's sigmas {paper.SIGMAS[0]:g} and {paper.SIGMAS[1]:g} have no unit; both reports read them as "
-            "degrees per second of the rates, degrees of the joints, and the same share of the accelerometer's peak. "
+            "degrees per second for the rates and degrees for the joints; the accelerometer's sigma is the same "
+            "fraction of its peak signal as that of the rates is of the peak rate, and “4 % of peak” is that fraction. "
             "'2″' is a star tracker whose attitude is differentiated; its noise is taken as white.",
             known="Orbit, arm and initial attitude. There is no prior.",
             unknown="Ten parameters of the base and the initial rate.",
@@ -122,9 +123,10 @@ def _answer(result: Result) -> str:
     best = result.joints[level][LIKELIHOOD]
     mass, moment = tables.equal_rms(result, level, PAPER)
     return (
-        f"With noise of {level} one manoeuvre determines the mass to {tables.rms_of(best, MASS)} %; the paper expects "
-        f"2 %. The worst moment is determined to {tables.rms_of(best, best.worst())} %. Both are results of the "
-        f"package's likelihood; the paper's procedure gives {mass} % and {moment} %."
+        f"With noise of {level} one manoeuvre determines the mass to {tables.rms_of(best, MASS)} % and the least well "
+        f"determined moment of inertia to {tables.rms_of(best, best.worst())} % (brackets: Monte-Carlo error of the "
+        "last digits); the paper expects 2 %. Both are results of the package's likelihood; the paper's procedure "
+        f"gives {mass} % and {moment} %."
     )
 
 
@@ -194,15 +196,15 @@ def _negatives(document: Document, result: Result) -> None:
     ratio = float(equal.sd[k] / weighted.sd[k])
     error = ratio * float(np.hypot(*(spread.sd_error[k] / spread.sd[k] for spread in (equal, weighted))))
     texts = [
-        "The package's likelihood: at the junctions of (27) the third derivative of the joint motion jumps, and a jump "
-        "that the samples do not resolve biases the smoother. The ratio of actual to stated errors is "
-        f"{tables.honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
-        f"{tables.honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} without those samples (over all levels: "
-        f"{_over_levels(result, LIKELIHOOD)}, and {_over_levels(result, WITHOUT_JUNCTIONS)} without them).",
+        "The package's likelihood: at the junctions of the motion, Eq. (27), the third derivative of the joint angles "
+        "jumps, and a jump that the samples do not resolve can bias the smoother. The ratio of actual to stated errors "
+        f"is {tables.honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)} with the samples near "
+        f"the junctions and {tables.honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} without them (over all "
+        f"levels: {_over_levels(result, LIKELIHOOD)} and {_over_levels(result, WITHOUT_JUNCTIONS)}).",
         *(_failing(result, name) for name, spreads in result.joints.items() if not _is_honest(_ratios(spreads))),
-        "If the accelerometer is integrated as in (21), with equally weighted velocities that are taken as white, the "
-        f"worst moment is {tables.percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ "
-        f"m/s² changes the mass by {format_percent(abs(float(falsified[EQUAL][MASS])), 2)} (without integration: "
+        "If the accelerometer is integrated as in Eq. (21), with equally weighted velocities that are taken as white, "
+        f"the worst moment is {tables.percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of "
+        f"10⁻⁴ m/s² changes the mass by {format_percent(abs(float(falsified[EQUAL][MASS])), 2)} (without integration: "
         f"{format_percent(abs(float(falsified[WEIGHTED][MASS])), 2)}). For one unknown, the variance is 3 times that "
         f"of the accelerations in closed form (computed: {format_fixed(result.scalars[0].matrices ** 2, 2)}).",
     ]
@@ -224,9 +226,9 @@ def _linear(result: Result) -> str:
         )
     )
     return (
-        f"The linear method (19) is biased because its regressor is measured. At {level} central differences give a "
-        f"mass error of {raw} ({closed} in closed form), and the best treatment ({name}) gives {least}. More samples "
-        "do not reduce the bias."
+        f"The linear method, Eq. (19), is biased because its regressor is measured. At {level} central differences "
+        f"give a mass error of {raw} ({closed} in closed form), and the best treatment ({name}) gives {least}. More "
+        "samples do not reduce the bias."
     )
 
 
@@ -253,11 +255,11 @@ def _smoothed(errors: SmoothingErrors) -> str:
         joined([format_fixed(float(value), 2) for value in values]) for values in (errors.measured, errors.expected)
     )
     return (
-        "The reason: the stated errors contain noise that the smoother lets pass and motion that it removes, as they "
-        "must for a motion as rough as its process, and this motion is smoother. Errors of position, velocity and "
-        f"acceleration are {measured} times the stated ones. If only noise passed, they would be {expected} times, "
-        "√(1 − (2d + 1)/(2p)) for derivative d and a process of order p. Such errors are too large, never too small; "
-        "a planned motion without junctions would allow higher orders."
+        "The reason: the stated errors allow for encoder noise that passes the smoother and for real motion that it "
+        "removes; this motion is smoother than the smoother's model assumes, so the second part is overstated. Errors "
+        f"of position, velocity and acceleration are {measured} times the stated ones. If only noise passed, they "
+        f"would be {expected} times, √(1 − (2d + 1)/(2p)) for derivative d and a process of order p. Away from the "
+        "junctions the stated errors are therefore too large, not too small."
     )
 
 
@@ -272,9 +274,9 @@ def _failing(result: Result, level: str) -> str:
         return f"{text} The stated errors are wrong with exact joints too; the cause is not known."
     share = float((exact.rms[JUDGED] / spread.rms[JUDGED]).max())
     return (
-        f"{text} With exact joints the ratio is {tables.honesty_of(exact)} and the errors are "
-        f"{format_percent(share, 1)} of these at most: the wrongly stated part is the noise of the encoders after the "
-        f"smoother. {_smoothed(result.smoothing[level])}"
+        f"{text} With exact joints the ratio is {tables.honesty_of(exact)}, and the errors are "
+        f"at most {format_percent(share, 1)} of those with measured joints; it is the propagated encoder noise that is "
+        f"misstated. {_smoothed(result.smoothing[level])}"
     )
 
 
@@ -285,7 +287,7 @@ def _evidence(document: Document, result: Result) -> None:
         [
             "noise",
             *(name if name != EXACT else "exact joints" for name in names),
-            "exact joints, velocity: (21)",
+            "exact joints, Eq. (21)",
             PAPER,
         ],
         [
@@ -304,8 +306,8 @@ def _evidence(document: Document, result: Result) -> None:
     document.table(
         ["treatment of the joints", "mass: bias", "sd", "moment: bias", "sd", "actual / stated"],
         tables.treatment_rows(result, standard),
-        f"Treatments of the joints at {format_text(standard)}, base sensors as read [%]. Actual over stated errors are "
-        "ranges over mass and moments; a calibrated treatment has 1.",
+        f"Treatments of the joints at {format_text(standard)}, rates and accelerations not filtered [%]. Actual over "
+        "stated errors are ranges over mass and moments; a calibrated treatment has 1.",
         columns("lrrrrr"),
     )
     shown = {name: result.joints[name] for name in SHOWN if name in result.joints}
@@ -359,9 +361,9 @@ def _averaged(exact: Spread, likelihood: Spread) -> str:
     stated = float(np.sqrt((exact.stated[:, JUDGED] ** 2).mean(axis=0)).max())
     fewest = np.ceil(max(1.0, (stated / PLANE) ** 2))
     return (
-        f"Averaging reduces noise: with the likelihood 2 % require {format_fixed(count, 0)} ± {format_fixed(error, 0)} "
-        f"such manoeuvres by the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} by the "
-        f"first-order standard deviations (worst: {format_percent(stated, 2)}), as in the report on the base body."
+        f"Averaging {format_fixed(count, 0)} ± {format_fixed(error, 0)} such manoeuvres would reach 2 % with the "
+        f"likelihood, according to the errors over {len(likelihood.errors)} sets of noise ({fewest:.0f} according to "
+        f"the first-order standard deviations, worst {format_percent(stated, 2)}; see the report on the base body)."
     )
 
 

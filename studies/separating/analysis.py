@@ -42,7 +42,7 @@ DIRECTIONS = ("stated", "random")  # direction of a hidden cause, whose size is 
 
 SPREAD = 0.1  # relative width of the prior of the base
 
-# rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit
+# rate of the base when a manoeuvre starts, 1.5 degrees in a minute [rad/s]; unknown to every fit
 DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
 
 NEEDED = float(np.log(DECISION / (1.0 - DECISION)))  # log Bayes factor at a decision between two causes
