@@ -165,8 +165,10 @@ def _versions(summaries: Mapping[str, dict[str, Any]]) -> str:
         for release in sorted({version["release"] for version in summary.get("versions", [])} or {UNRECORDED.release}):
             studies.setdefault(release, []).append(name)
     if len(studies) == 1:
-        return f"All figures are of bayesid {next(iter(studies))}."
-    return "Figures are of bayesid " + "; ".join(f"{key} ({', '.join(names)})" for key, names in studies.items()) + "."
+        return f"All results are from bayesid {next(iter(studies))}."
+    return (
+        "Results are from bayesid " + "; ".join(f"{key} ({', '.join(names)})" for key, names in studies.items()) + "."
+    )
 
 
 def _summaries(folder: Path) -> dict[str, dict[str, Any]]:

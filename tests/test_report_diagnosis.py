@@ -879,8 +879,10 @@ def test_without_a_record_the_box_has_none(biased):
     entries = dict(decision_entries(biased))
     assert "Record" not in entries
     assert entries["Cause"].startswith("accel-bias, probability > 0.999. The accelerometer")
-    assert entries["Size, ± 95 %"] == size_text(biased.after, "accel-bias")
-    assert entries["Changes"].startswith("Without the named causes, base_link.mass would be wrong by 25 standard dev")
+    assert entries["Size, with 95 % interval"] == size_text(biased.after, "accel-bias")
+    assert entries["Changes"].startswith(
+        "Without the named causes, the estimate of base_link.mass would shift by 25 standard dev"
+    )
     assert "accel 3.2 × 10⁻⁵ before, 1.7 × 10⁻⁵ after (noise alone 1.7 × 10⁻⁵) m/s²" in entries["Changes"]
     change = biased.motion_change
     assert f"the predicted base rate by up to {format_number(change.rate, 2)} rad/s" in entries["Changes"]

@@ -151,8 +151,9 @@ def _report(result: Result) -> Report[Result]:
         question="Ten numbers describe the inertia of a rigid body. Which combinations of the robot's 10 (n + 1) "
         "numbers do motion and joint torques determine, and what fixes the scale of the masses, which motion alone "
         "does not determine?",
-        answer=f"Motion and joint torques determine {arm.count} sums of the {len(arm.standard)} inertial parameters of "
-        f"ETS-VII. With two joints they determine {planar.count} of {len(planar.standard)}. Motion alone does not "
+        answer=f"Motion and joint torques determine {arm.count} independent linear combinations of the "
+        f"{len(arm.standard)} inertial parameters of ETS-VII, and {planar.count} of {len(planar.standard)} for a robot "
+        "with two joints. Motion alone does not "
         "determine the scale of all masses; the gravity gradient does not provide it either, but one known body, "
         "torque or thrust does.",
         goals=goals_of(result),
@@ -198,8 +199,9 @@ def goals_of(result: Result) -> list[Goal]:
             Severity.HIGH,
         ),
         Goal(
-            "as by Pinocchio: wrench and torques of (23), all parameters recovered by (24) from its torques once the "
-            "dependent ones are known, and rank on a fixed base, three cases",
+            "agreement with Pinocchio: wrench and torques of (23), all parameters recovered by (24) from its torques "
+            "once the dependent ones are known, and rank on a fixed base, for both robots and for ETS-VII in tilted "
+            "gravity",
             f"largest difference {format_number(float(alike), 1)} N, N m; largest relative error "
             f"{format_number(recovery.standard_error, 1)}; "
             + ", ".join(f"{count} and {rank}" for count, rank in ranks),
@@ -237,7 +239,8 @@ def _negatives(document: Document, result: Result) -> None:
             "No data of motion and torques determine the dependent parameters K₂ (mass, first moment along the joint's "
             f"axis and one moment of each link). K₂ that is {format_percent(WRONG - 1.0)} too large explains {STATES} "
             f"exact states equally well (torques differ by {format_number(recovery.torque_error, 1)} of the largest), "
-            f"with different values of K₁: {name} would be {format_number(wrong, 4)} and is {format_number(true, 4)}. "
+            f"with other values of the independent parameters K₁: {name} becomes {format_number(wrong, 4)} instead of "
+            f"{format_number(true, 4)} (SI units). "
             f"{recovery.untouched} parameters of K₁ do not change.",
             "Motion without torques does not determine the scale of all masses: multiplied by a common factor, they "
             "give the same motion. The gravity gradient does not help, since its wrench is linear in the same "

@@ -77,7 +77,12 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
             sum(t.remainder != "none" for t in pairs),
             len(pairs),
         ),
-        _most(f"Outside, named at {SURE:g} or more", FEW_OUTSIDE, sum(map(surely_misnamed, outside)), len(outside)),
+        _most(
+            f"Outside: a wrong cause named at {SURE:g} or more",
+            FEW_OUTSIDE,
+            sum(map(surely_misnamed, outside)),
+            len(outside),
+        ),
         _worst_kind(outside),
         _least(
             f"Outside, reported as unknown or as partly explained at {LEFT:g} sigma or more",
@@ -85,7 +90,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
             sum(map(_said_unknown, left)),
             len(left),
         ),
-        _correlation("outside torques", LIKE, TORQUES, trials),
+        _correlation("smooth outside torques", LIKE, TORQUES, trials),
         _coverage([t.amplitude_errors for t in trials if t.named_rightly and t.amplitude_errors]),
         _scatter("amplitudes", amplitudes),
         _scatter("base parameters", bodies),
@@ -125,7 +130,7 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
 
 def _worst_kind(trials: Sequence[Trial]) -> Goal:
     """Return the goal that no kind of outside effect is often named, by the shares that were observed."""
-    text = f"Outside, named at {SURE:g} or more: at most {100.0 * OF_ONE_KIND:g} % of any kind"
+    text = f"Outside: a wrong cause named at {SURE:g} or more: at most {100.0 * OF_ONE_KIND:g} % of any kind"
     kinds: dict[str, list[bool]] = {}
     for trial in trials:
         kinds.setdefault(trial.case, []).append(surely_misnamed(trial))
@@ -133,7 +138,7 @@ def _worst_kind(trials: Sequence[Trial]) -> Goal:
         return Goal(text, "none", Verdict.NOT_TESTED, Severity.HIGH)
     name, named = max(kinds.items(), key=lambda item: (sum(item[1]) / len(item[1]), item[0]))
     verdict = Verdict.of(sum(named) <= OF_ONE_KIND * len(named))
-    return Goal(text, f"{sum(named)} of {len(named)} ({name}), {len(kinds)} kinds", verdict, Severity.HIGH)
+    return Goal(text, f"worst of {len(kinds)} kinds: {name}, {sum(named)} of {len(named)}", verdict, Severity.HIGH)
 
 
 def in_basilisk(trials: Sequence[Trial]) -> list[Trial]:

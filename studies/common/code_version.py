@@ -56,7 +56,7 @@ def caution(versions: Iterable[CodeVersion], present: CodeVersion) -> str:
     if not others:
         return ""
     made = ", ".join(f"{version.release} (commit {version.commit})" for version in others)
-    return f"Figures were made by bayesid {made}; the code that makes them has changed since."
+    return f"The numbers were made by bayesid {made}; its code has changed since, so the present one may give others."
 
 
 def refusals(summaries: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:

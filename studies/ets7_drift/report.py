@@ -64,16 +64,16 @@ def _report(cases: Cases) -> Report[Cases]:
             "uncertainty after the rates and the attitude's noise.",
         ),
         setup=Setup(
-            robot=f"ETS-VII as supplied with this package, on a circular orbit of {RADIUS / 1e3:g} km, without "
+            robot=f"ETS-VII as supplied with this package, on a circular orbit of {RADIUS / 1e3:g} km radius, without "
             "attitude control. An independent simulator (MuJoCo) generates the recordings.",
             manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; "
             f"its linear ramps are replaced by quintic ones. The tip moves at up to {1e3 * fastest:.0f} mm/s; the "
             f"flight rule is {1e3 * TIP_SPEED:.0f} mm/s.",
             sensors=f"Every {analysis.INTERVAL:g} s, noise per sample: rates {format_number(analysis.RATE_SIGMA)} "
-            f"rad/s (the paper's star tracker: 2 arcsec), joints {format_number(analysis.ENCODER_SIGMA)} rad. The "
-            f"attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, is used for comparison only, except for the "
-            "exact one at the start.",
-            known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
+            "rad/s (the number of radians in the 2 arcsec of the paper's star tracker), joints "
+            f"{format_number(analysis.ENCODER_SIGMA)} rad. The attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, "
+            "is used for comparison only, except for the exact one at the start.",
+            known="Orbit, links and joint motion. The present simulation starts at rest and includes no effect.",
             unknown=f"Base body, with a mass uncertain by {' or '.join(analysis.KNOWN)} (1 sigma); the true base is a "
             f"draw from this prior. Hidden: gravity gradient, wheel momentum {format_vector(analysis.MOMENTUM)} N m s, "
             f"and initial rates of {format_number(analysis.RATE)} rad/s per axis (assumed, as no values are public).",
@@ -109,14 +109,12 @@ def _answer(cases: Cases) -> str:
         said = [
             f"The diagnosis names {_named(case)} with a base uncertain by {known}." for known, case in cases.items()
         ]
+    parts = []
     for known, case in cases.items():
         before, after = (format_number(_rms(case, name), 2) for name in ("plain", "extended"))
-        angle = f"With a base uncertain by {known} (1 sigma), {ANGLE}"
-        named = bool(case.diagnosis.verdict.causes)
-        said.append(
-            f"{angle} falls from {before} to {after} degrees." if named else f"{angle} stays at {before} degrees."
-        )
-    return " ".join(said)
+        change = f"falls from {before} to {after}" if case.diagnosis.verdict.causes else f"stays at {before}"
+        parts.append(f"{change} degrees with a base uncertain by {known} (1 sigma)")
+    return " ".join([*said, f"{ANGLE[:1].upper()}{ANGLE[1:]} {joined(parts)}."])
 
 
 def _named(case: Case) -> str:
@@ -212,7 +210,8 @@ def _failures(known: str, case: Case) -> list[str]:
             if case.diagnosis.bodies_fixed
             else f"Fitted to the rates, the base's mass has an error of {format_signed(float(off), 0)} %"
         )
-        + f". With the fitted values {ANGLE} is {format_number(_rms(case, 'fitted'), 2)} degrees."
+        + f". Simulated with {'that' if case.diagnosis.bodies_fixed else 'the fitted'} base, {ANGLE} is "
+        f"{format_number(_rms(case, 'fitted'), 2)} degrees."
     ]
     missed = [cause for cause in analysis.CAUSES if cause not in verdict.causes]
     wrong = [cause for cause in verdict.causes if cause not in analysis.CAUSES]
@@ -315,10 +314,10 @@ def _statements(cases: Cases) -> list[Statement]:
         Statement(
             "Gravity gradient, residual momentum of the wheels and a non-zero initial rate give rise to the drift (1).",
             Finding.CONFIRMED if right else Finding.NOT_TESTABLE,
-            "In simulation: the three cause a drift like that of figure 2, and with a base uncertain by "
+            "In simulation, these three effects produce a drift like that of figure 2; with a base uncertain by "
             f"{' and '.join(right)} they are named from the rates alone and predict the attitude."
             if right
-            else "The three cause a drift like that of figure 2, but the diagnosis does not name them.",
+            else "These three effects produce a drift like that of figure 2, but the diagnosis does not name them.",
         ),
         Statement(
             "They gave rise to the drift of the flight.",

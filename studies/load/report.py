@@ -116,8 +116,8 @@ def _report(result: Result) -> Report[Result]:
         subtitle="Section 4.2 of Lampariello and Hirzinger (IDETC 2005)",
         question="Does a loop that plans, flies and identifies safely find a load of 370 kg from a guess of 10 kg?",
         answer=f"From a guess of 10 kg the loop identified {reached} kg in {len(loop.bodies)} manoeuvres {within}. "
-        f"With the arm known exactly, the same manoeuvres give {ideal} kg: the uncertainty of 5 % (1 sigma) in each "
-        "link mass dominates the result.",
+        f"With the arm known exactly, the same manoeuvres give {ideal} kg: the 5 % uncertainty (1 sigma) of each link "
+        "mass dominates that of the load.",
         goals=_goals(result),
         valid="the base is known exactly and rests before each manoeuvre, the load is rigid and rigidly attached, "
         "and only the gravity gradient acts, which the diagnosis of each step had to confirm.",
@@ -161,11 +161,10 @@ def _failures(document: Document, result: Result) -> None:
     share = format_percent(floor / paper.TRUTH[MASS], 2)
     remaining = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
-        f"With an arm uncertain by 5 % (1 sigma), no manoeuvre can reach {format_percent(loops.GOAL, 2)}: motion gives "
-        "the load's mass only relative to known masses (report on the whole system), and link 6 and the load move as "
-        f"one body. The prior of the arm sets the floor: 5 % of the link's mass is {format_number(floor, 2)} kg, "
-        f"{share} of the load. After the last manoeuvre the sd of the load's mass is {remaining} kg, and the error "
-        f"{format_percent(float(abs(loop.error(-1)[MASS])), 2)}."
+        f"With an arm uncertain by 5 % (1 sigma), no manoeuvre can reach {format_percent(loops.GOAL, 2)}: link 6 and "
+        "the load move as one body, so the error of link 6's mass goes fully into that of the load. 5 % of link 6 is "
+        f"{format_number(floor, 2)} kg, {share} of the load. After the last manoeuvre the sd of the load's mass is "
+        f"{remaining} kg, and the error {format_percent(float(abs(loop.error(-1)[MASS])), 2)}."
     )
     attempts = []
     for number, plan in enumerate(loop.plans, start=1):
@@ -215,8 +214,9 @@ def _evidence(document: Document, result: Result) -> None:
     document.figure(
         _error_figure(result.iterations),
         "The paper's case repeated without noise, within the flight rule: relative errors of the ten quantities; those "
-        "of the products of inertia are relative to the moments. MuJoCo flew the motion (27) that maximises (26) as "
-        "intended; the fit is least squares without a prior.",
+        "of the products of inertia are relative to the moments. MuJoCo flew the paper's motion, Eq. (27), with the "
+        "parameters that maximise Eq. (26) in the form that the paper presumably intended; the fit is least squares "
+        "without a prior.",
     )
 
 
@@ -236,7 +236,7 @@ def _statements(result: Result) -> list[Statement]:
             "The second iteration gives a clear improvement (4.2).",
             Finding.CONFIRMED if second < 0.1 * first else Finding.NOT_TESTABLE,
             "Without noise the first iteration already reaches the precision of the integration, so little can be "
-            "improved: the paper's first result was not a converged fit.",
+            "improved, and the paper's first result was probably not a converged fit.",
         ),
         Statement(
             "The load's inertia is printed without its reference point (4.2).",

@@ -14,6 +14,7 @@ from bayesid import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.evidence.verdict import Rest
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
@@ -262,7 +263,10 @@ def _moments_no_worse(result: Result) -> Goal:
     }
     return Goal(
         "largest error of the diagnosed throws' moments is no larger with the named causes than with a rigid body",
-        "; ".join(f"{body} {rigid:.2f} to {extended:.2f} %" for body, (rigid, extended) in largest.items())
+        "; ".join(
+            f"{body} {rigid:.2f} % (rigid) and {extended:.2f} % (named causes)"
+            for body, (rigid, extended) in largest.items()
+        )
         or "not run",
         Verdict.of(all(extended <= rigid for rigid, extended in largest.values()) if largest else None),
         Severity.HIGH,
@@ -291,7 +295,7 @@ def _reverse(result: Result) -> list[Goal]:
     return [
         Goal(
             titles[0],
-            f"at least {min(probabilities):.3f}",
+            f"smallest probability {format_probability(min(probabilities))}",
             Verdict.of(min(probabilities) >= DEFAULT_SETTINGS.named_from),
             Severity.MEDIUM,
         ),
@@ -387,7 +391,13 @@ def _report(result: Result) -> Report[Result]:
     stated = " and ".join(f"{_uncertain(body)} % ({body.name})" for body in bodies)
     rigid = " and ".join(f"{result.plain.bodies[body.name].mean_error:.2f} % ({body.name})" for body in bodies)
     named = sum(bool(study.diagnosis.verdict.causes) for study in result.studies)
-    causes = f" A cause is named on {named} of {len(result.studies)} bodies." if result.studies else ""
+    beside = sum(study.diagnosis.remainder.verdict is Rest.PRESENT for study in result.studies)
+    causes = (
+        f" The diagnosis names at least one cause on {named} of {len(result.studies)} bodies, and states on {beside} "
+        "that something unnamed remains."
+        if result.studies
+        else ""
+    )
     return Report(
         title="Thrown bodies",
         subtitle="Real measurements of a small free-flying device with one reaction wheel",
@@ -428,12 +438,13 @@ def _setup(result: Result) -> Setup:
         robot="A device with one reaction wheel, alone (cal_device), on a box of known inertia (cal_proof), on a plate "
         "(Empty), and on the plate with blocks (A).",
         manoeuvre="Thrown by hand and caught; the wheel spins up and down in flight. No speed limit applies.",
-        sensors=f"Gyro, accelerometer and wheel speed, raw at 4 kHz. Samples every {1e3 * INTERVAL:g} ms are local "
-        "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured in quiet "
+        sensors=f"Gyro, accelerometer and wheel speed, raw at 4 kHz. Samples every {1e3 * INTERVAL:g} ms are "
+        "values of parabolas fitted locally with Gaussian weights; the noise of neighbouring samples is uncorrelated. "
+        "Their noise is measured in quiet "
         "intervals, by body and axis. Rates next to the largest accelerations of the wheel "
-        f"({Timing().fast:.0f} rad/s² within {1e3 * Timing().margin:g} ms) and the last 20 ms are omitted. A recording "
-        "begins at the same angle of the wheel in all throws of a body, which follows from the line of its imbalance "
-        "in the raw readings.",
+        f"({Timing().fast:.0f} rad/s² within {1e3 * Timing().margin:g} ms) and the last 20 ms are omitted. All "
+        "recordings of a body are cut to begin at the same wheel angle, determined from the imbalance signal in the "
+        "raw readings.",
         known=f"Mass, and the stated moments, taken as uncertain by {100 * PLATE_SD:.0f} % for the plate (CAD) and by "
         f"{100 * BLOCK_SD:.1f} % for the contribution of the blocks (our estimates). Inertias are relative to that of "
         "the wheel, which the box calibrates; the device is subtracted with the parallel-axis theorem.",
@@ -491,7 +502,7 @@ def _shared_error(body: BodyResult) -> str:
     inside, total = body.covered(0.95, about=body.joint)
     return (
         f"{body.name}: the joint fit of all throws differs from the stated moments by {errors} %; {inside} of {total} "
-        "intervals of single throws contain the joint values instead."
+        "intervals of single throws contain the value of the joint fit."
     )
 
 
@@ -565,9 +576,9 @@ def _diagnosis(document: Document, result: Result) -> None:
         chi2 = [diagnosis.gain.before.chi2_per_sample for diagnosis in result.wheels.values()]
         document.paragraph(
             "Without the recorded wheel, the chi-square per sample of the present model is "
-            f"{format_number(min(chi2), 2)} to {format_number(max(chi2), 2)}. For {unfitted} of {len(result.wheels)} "
-            f"bodies the parameters are fixed at the prior and causes are weighed along the measured motion. This took "
-            f"{minutes} minutes."
+            f"{format_number(min(chi2), 2)} to {format_number(max(chi2), 2)}. On {unfitted} of {len(result.wheels)} "
+            "bodies it cannot follow the data: their parameters were held at the prior, and the effect of each cause "
+            f"was computed along the measured motion. These diagnoses took {minutes} minutes."
         )
 
 

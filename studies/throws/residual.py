@@ -171,7 +171,7 @@ def shaking_words(left: Mapping[str, Residual]) -> list[str]:
     return [
         "The wheel shakes the device: the strongest line of the raw accelerometer is at the frequency of the wheel in "
         f"{count} of {total} throws.",
-        f"The residual is largest while the wheel is {most} on {loudest.count(most)} of {len(left)} bodies. An "
+        f"The residual is largest in the wheel's phase “{most}” on {loudest.count(most)} of {len(left)} bodies. An "
         f"imbalance of the observed size would give {min(running):.1f} to {max(running):.1f} times the residual of the "
         "samples while the wheel is running up.",
     ]

@@ -121,7 +121,7 @@ def _goals(result: Result) -> list[Goal]:
     system = groups(result.truth)["whole system"]
     goals = []
     titles = (
-        "motion alone, which gives no absolute scale: the finding to which other reports refer",
+        "motion alone",
         "joint torques",
         "a known thrust",
     )
@@ -178,10 +178,10 @@ def _negatives(document: Document, result: Result) -> None:
     before, after = _known(result, *CHIEF[0]).mass(*groups(result.truth)["whole system"])
     texts = [
         "Motion alone gives no absolute scale: the equations of motion are homogeneous in the masses, gravity gradient "
-        "included, so no manoeuvre, sensor of motion or time determines it. The prior sets the floor. The drawings "
-        f"determine the mass of the whole system to {format_percent(before, 2)} and the motion improves this to "
-        f"{format_percent(after, 2)} only because it fixes mass ratios. The reports on the base body, on what ETS-VII "
-        "could have identified and on a load refer to this finding.",
+        "included, so no manoeuvre, motion sensor or observation time can determine it. The prior sets the floor. The "
+        f"drawings determine the mass of the whole system to {format_percent(before, 2)} and the motion improves this "
+        f"to {format_percent(after, 2)} only because it fixes mass ratios. The reports on the base body, on what "
+        "ETS-VII could have identified and on a load refer to this finding.",
         "With motion alone, the paper's linear regressor method (19) estimates the mass of the whole system as "
         f"{format_percent(system, 2)} of its true value and states a standard deviation of "
         f"{format_percent(float(linear.believed[:, 3].mean()), 2)}. The right side of its equations is zero, so the "
@@ -303,7 +303,7 @@ def _statements(result: Result) -> list[Statement]:
             "The linear method requires joint torques and a friction model: with a right side of zero it is badly "
             "posed (3).",
             Finding.CONFIRMED if bias > FAR else Finding.REFUTED,
-            f"With motion alone its mean error is {format_number(bias, 2)} of its stated standard deviations.",
+            f"With motion alone its mean error is {format_number(bias, 2)} times its stated standard deviation.",
         ),
         Statement(
             "Identification of the whole system requires a known part (5).",

@@ -58,8 +58,9 @@ GLOSSARY = (
     ),
     (
         "SNR",
-        "Signal-to-noise ratio. Of a candidate: square root of its decrease of chi-square minus its number of free "
-        "amplitudes, or 0 if that is negative. Of a noise fault: standard normal quantile of its unadjusted p.",
+        "Signal-to-noise ratio. Of a candidate: √max(Δχ² − n, 0), where Δχ² is its decrease of chi-square with all "
+        "unknowns fitted again and n its number of free amplitudes. Of a noise fault: standard normal quantile of its "
+        "unadjusted p.",
     ),
     ("power", "Probability that a candidate with a size drawn from its prior would have raised the alarm."),
     ("95 % limit", "Value below which the magnitude of a quantity lies with a probability of 95 %."),

@@ -66,13 +66,13 @@ def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple
     verdict = result.verdict
     entries = [("Verdict", verdict_sentence(result))]
     for cause in verdict.causes:
-        entries += [("Cause", _cause_text(result, cause)), ("Size, ± 95 %", size_text(result.after, cause))]
+        entries += [("Cause", _cause_text(result, cause)), ("Size, with 95 % interval", size_text(result.after, cause))]
     entries += [
         ("Alternative", f"{set_text(names)}, probability {format_probability(result.probability_of(names))}")
         for names in verdict.ambiguous_with
     ]
     listed = "; ".join(" ".join(row) for row in probability_rows(result, CLASSES))
-    entries.append(("Probable", f"{listed}; each cause alone or with others."))
+    entries.append(("Probabilities", f"{listed}; each cause alone or with others."))
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED, Status.PARTLY_EXPLAINED):
         entries.append(("Unexplained", wrench_sentence(result.unexplained)))
     if result.torques is not None:
@@ -91,9 +91,7 @@ def _picture_text(result: Diagnosis) -> str:
     """Return what the picture of the robot shows."""
     if not result.named:
         return "Left: the robot at the start."
-    return (
-        "Left: the robot at the start, viewed so that no arrow is foreshortened, with the cause in blue where it acts."
-    )
+    return "Left: the robot at the start, seen at right angles to the arrow, with the cause in blue where it acts."
 
 
 def _cause_text(result: Diagnosis, cause: str) -> str:
@@ -120,10 +118,12 @@ def _change_text(result: Diagnosis) -> str:
 def _moved_text(moved: ParameterChange) -> str:
     """Return by how much the parameter that moves most would be wrong."""
     relative = abs(moved.fitted / moved.without - 1.0) if moved.without else 0.0
-    share = f" or {format_percent(relative, 2)}" if 0.0 < relative < 1.0 else ""  # moments about zero have no share
+    share = (
+        f" ({format_percent(relative, 2)} of its value)" if 0.0 < relative < 1.0 else ""
+    )  # moments about zero have no share
     return (
-        f"{moved.name} would be wrong by {format_number(abs(moved.shift), 2)} standard deviations{share}, more than "
-        f"any other parameter ({format_quantity(moved.without, moved.without_sd)} in place of "
+        f"the estimate of {moved.name} would shift by {format_number(abs(moved.shift), 2)} standard deviations{share}, "
+        f"more than that of any other parameter ({format_quantity(moved.without, moved.without_sd)} in place of "
         f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)})"
     )
 
@@ -131,9 +131,10 @@ def _moved_text(moved: ParameterChange) -> str:
 def _motion_texts(result: Diagnosis) -> Iterator[str]:
     """Yield by how much the predicted motion would be wrong."""
     if change := result.motion_change:
-        yield f"the predicted base rate by up to {format_number(change.rate, 2)} rad/s"
+        yield f"the predicted base rate would be wrong by up to {format_number(change.rate, 2)} rad/s"
         if change.tip_frame is not None:
-            yield f"the predicted position of {change.tip_frame} by up to {format_number(1e3 * change.tip, 2)} mm"
+            tip = format_number(1e3 * change.tip, 2)
+            yield f"the predicted position of {change.tip_frame} would be wrong by up to {tip} mm"
 
 
 def conditions_text(hypothesis: Hypothesis) -> str:

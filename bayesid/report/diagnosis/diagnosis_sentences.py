@@ -241,7 +241,7 @@ def wrench_sentence(wrench: DisturbingWrench) -> str:
     where = (
         FIXED[wrench.fixed_in]
         if wrench.fixed_in
-        else "The data do not determine the axes in which the torque has a fixed direction."
+        else "The data do not show whether the torque's direction is fixed in base, orbit or inertial axes."
     )
     strength = format_fixed(wrench.signal_to_noise, 1)
     return (

@@ -54,14 +54,13 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
 def _add_unseen(document: Document, result: Diagnosis) -> None:
     if hidden := result.unseen_candidates:
         document.paragraph(
-            "These manoeuvres could hardly have detected the following candidates: with a size drawn from its "
-            "prior, each would have raised no alarm in more than half of all cases. Their absence from the verdict is "
-            "only weak evidence of their absence."
+            "With a size drawn from its prior, each of the following candidates would have raised no alarm in more "
+            "than half of all cases, so its absence from the verdict is only weak evidence against it."
         )
         document.table(
             ["candidate", "power:", "95 % limits, if the only cause"],
             unseen_rows(hidden),
-            "Candidates that these manoeuvres could hardly have detected.",
+            "Candidates whose typical size these manoeuvres would often have missed.",
         )
     elif result.verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
         document.paragraph(

@@ -81,7 +81,8 @@ class WheelMomentum(Effect):
 
     name = "wheel-momentum"
     summary = (
-        "Spinning reaction wheels make the base a gyroscope: a rotation about one axis causes a rotation about another."
+        "The momentum of spinning reaction wheels couples the axes of the base: turning it about one axis causes a "
+        "torque about another."
     )
     separated_by = (
         "Its torque grows with the base's rate: repeat with the base rotating faster and about other axes; a torque "
