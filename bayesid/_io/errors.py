@@ -8,7 +8,7 @@ __all__ = ["InputError"]
 
 
 class InputError(ValueError):
-    """Error in the input of a user.
+    """Invalid input.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ def run(
     name: Annotated[str | None, typer.Argument(help="Name of an effect; by default all effects.")] = None,
     study: Annotated[
         Path | None,
-        typer.Option(metavar="STUDY.toml", help="Study whose robot, orbit and plugins are used; by default ETS-VII."),
+        typer.Option(metavar="STUDY.toml", help="Study with robot, orbit and plugins; by default those of ETS-VII."),
     ] = None,
 ) -> Iterator[str]:
     """List the effects of the catalogue: parameters, units, priors, largest plausible sizes, requirements."""

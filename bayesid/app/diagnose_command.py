@@ -26,7 +26,9 @@ def run(
     seed: Seed = 0,
     effective_samples: Samples = 4000.0,
     sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee after the verdict.")] = True,
-    fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre if the verdict is undecided.")] = True,
+    fly_next: Annotated[
+        bool, typer.Option(help="Design the next manoeuvre if the verdict is ambiguous or unresolved.")
+    ] = True,
     scheduler: Scheduler = None,
 ) -> Iterator[str]:
     """Name the causes of a misfit of the simulation, add them to the model and measure the improvement."""
@@ -66,7 +68,7 @@ def diagnose_study(
     keep : callable
         Function that receives the diagnosis.
     plan : bool
-        Whether to design the manoeuvre that would resolve an undecided verdict.
+        Whether to design the manoeuvre that would resolve an ambiguous or unresolved verdict.
     executor : concurrent.futures.Executor, optional
         As for `bayesid.diagnose`.
 

@@ -40,7 +40,10 @@ def run(
         float | None, typer.Option(metavar="MM", help="Required longest semi-axis of the end-effector's 95 % region.")
     ] = None,
     wanted_cause: Annotated[
-        str | None, typer.Option(metavar="NAME[=0.95]", help="Cause whose presence is to be decided.")
+        str | None,
+        typer.Option(
+            metavar="NAME[=0.95]", help="Cause whose presence or absence is to be established with that probability."
+        ),
     ] = None,
     at_most: Annotated[int, typer.Option(help="Maximum number of manoeuvres.")] = 5,
     diagnose: Annotated[bool, typer.Option(help="Diagnose after every step and stop if the model is wrong.")] = True,

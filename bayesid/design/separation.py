@@ -28,13 +28,14 @@ Floors = tuple[tuple[tuple[float, ...], ...], ...]
 @register_criterion
 @dataclass(frozen=True)
 class Separation(Criterion):
-    """Expected probability that the true one of rival effects is identified, for the one identified least often.
+    """Maximises the probability that a diagnosis identifies which of some rival effects is present.
 
-    A decision gives the true rival a probability of 0.9 or more against the others, all equally probable beforehand.
-    Size and direction of the true one follow the prior that a diagnosis gives it (`RivalPrior`). All other unknowns
-    are marginalised, and the readings are linear in amplitudes and unknowns about the prior's centre
-    (`bayesid.design.decision_rate`). Earlier manoeuvres count with their readings averaged, as if these were still to
-    come. In Python, the model of the plan must contain the rivals; the command adds them.
+    An effect is identified if it has a probability of 0.9 or more against the others, all equally probable beforehand;
+    of the rivals, the one that is identified least often counts. Size and direction of the true one follow the prior
+    that a diagnosis gives it (`RivalPrior`). All other unknowns are marginalised, and the readings are linear in
+    amplitudes and unknowns about the prior's centre (`bayesid.design.decision_rate`). Recordings that exist already are
+    treated like planned ones: their expected, not their actual readings count. In Python, the model of the plan must
+    contain the rivals; the command adds them.
 
     Parameters
     ----------

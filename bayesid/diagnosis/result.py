@@ -190,7 +190,7 @@ class Diagnosis(ShortForm):
 
     @property
     def rivals(self) -> tuple[str, str] | None:
-        """Two causes that the next manoeuvre should separate; None if the verdict has none of unknown size.
+        """Two causes that the next manoeuvre should separate; None unless two of the verdict have adjustable sizes.
 
         They are the first two in which the alternatives of an ambiguous verdict differ, and the most probable two
         classes of an unresolved one.

@@ -86,7 +86,7 @@ class StarTracker:
 
 @dataclass(frozen=True)
 class Scaled:
-    """Another noise times a factor per axis, for a data sheet that understates the noise."""
+    """A given noise model, scaled by a factor per axis, for a data sheet that understates the noise."""
 
     noise: Noise
     factor: tuple[float, ...]

@@ -59,7 +59,7 @@ def effort_of(starts: int, iterations: int, thorough: bool) -> Search:
     starts, iterations : int
         Numbers of random starts for every criterion, and of iterations from each.
     thorough : bool
-        Whether to search on between the best motions.
+        Whether to search more thoroughly, also from combinations of the best motions.
     """
     return replace(THOROUGH if thorough else Search(), starts=starts, iterations=iterations)
 
@@ -89,11 +89,12 @@ def design(
     iterations : int
         Maximum number of optimiser iterations per start.
     thorough : bool
-        Whether to continue the search between the best motions; this takes about five times as long.
+        Whether to search more thoroughly, also from combinations of the best motions; this takes about five times as
+        long.
     separate : tuple of two str, optional
         Labels of two effects that the manoeuvre must distinguish, instead of using the study's criteria.
     encoder : Encoder, optional
-        Noise of the joint encoders, by default the study's or that of a good encoder.
+        Noise of the joint encoders, by default that of the study, or else 1e-6 rad or m.
     executor : concurrent.futures.Executor, optional
         Where the searches run, by default in threads of this process.
     store : Store, optional

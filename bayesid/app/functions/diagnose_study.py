@@ -57,11 +57,11 @@ def diagnose(
     sample : bool
         Whether to sample the extended model with emcee after the verdict.
     fly_next : bool
-        Whether to design the next manoeuvre of a study if the verdict is undecided.
+        Whether to design the next manoeuvre of a study if the verdict is ambiguous or unresolved.
     effects : sequence of Effect, optional
         Candidates, by default all effects of the catalogue that can act.
     bounds : mapping of str to sequence of PhysicalBound, optional
-        Better-known largest sizes by the candidates' labels, by default those of the study.
+        Largest plausible sizes that replace the defaults, by the candidates' labels; by default those of the study.
     prior : CausePrior, optional
         Prior of the number of causes and of a cause outside the catalogue, by default that of the study.
     settings : DiagnosisSettings

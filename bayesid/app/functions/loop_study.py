@@ -164,7 +164,8 @@ def loop(
     effective_samples : float
         Goal for the number of effective samples of each identification.
     spacecraft : Spacecraft or path, optional
-        Object that executes plans, or the Python file that defines it; without it, recordings are put into the folder.
+        Object that executes plans, or the Python file that defines it; without it, you put the recordings into the
+        folder.
     precision : float, optional
         Required relative standard deviation of mass and principal moments; 0.01 if no other goal is given.
     wanted_sd : sequence of str, optional
@@ -172,7 +173,8 @@ def loop(
     wanted_tip : float, optional
         Required longest semi-axis of the end-effector's 95 % region [mm].
     wanted_cause : str, optional
-        ``NAME`` or ``NAME=PROBABILITY`` of a cause whose presence is to be decided, by default to 0.95.
+        ``NAME`` or ``NAME=PROBABILITY``: the loop ends when the probability of the cause is at least that, by default
+        0.95, or at most one minus it.
     at_most : int
         Maximum number of manoeuvres.
     diagnose : bool

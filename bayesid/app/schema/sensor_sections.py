@@ -157,7 +157,8 @@ class AccelSensor(MountedSensor):
     unit : str, optional
         Unit of the readings, such as "g", by default "m/s2"; noise and bias are always in m/s2.
     gravity : (3,), optional
-        Gravity contained in readings on the ground, in sensor axes at the first instant [m/s2].
+        Constant that gravity adds to readings on the ground, which is what the sensor reads at rest (+9.81 along the
+        upward axis), in sensor axes at the first instant; it is subtracted [m/s2].
     gravity_fixed_in : {"sensor", "space"}, optional
         Whether gravity is constant in the sensor axes or in space, by default in the sensor axes.
     """

@@ -54,7 +54,7 @@ class TelemetrySection(Section):
     time_unit : {"s", "ms", "us", "ns", "min"}, optional
         Unit of the times; if given, times counted from an earlier epoch, such as 1970, are shifted to the start.
     blocks_per_second : float
-        Minimum number of blocks per second over which samples are averaged; sensors with less than twice this rate
+        Minimum number of averaging blocks per second; sensors with less than twice this rate
         are not averaged, and 0 disables averaging [1/s].
     """
 

@@ -166,8 +166,8 @@ class Payload(_OnLink):
     is_added_body = True
     summary = "A body that is missing from the model is fixed to the link, such as a tool or a captured body."
     separated_by = (
-        "Its trace moves with the link: move the joint of the link through a different range with the others still, "
-        "and with the wrist in a different posture, to separate the effects of mass, centre of mass and inertia."
+        "The link's signature moves with it: move the joint of the link through a different range with the others "
+        "still, and with the wrist in a different posture, to separate the effects of mass, centre of mass and inertia."
     )
 
     @property
@@ -207,8 +207,8 @@ class LinkInertia(_OnLink):
     name = "link-inertia"
     summary = "The link's mass, centre of mass or inertia differs from the model (CAD) values."
     separated_by = (
-        "Its trace moves with the link: move the joint of the link through a different range with the others still; "
-        "two neighbouring links can be distinguished only if the joint between them moves alone."
+        "The link's signature moves with it: move the joint of the link through a different range with the others "
+        "still; two neighbouring links can be distinguished only if the joint between them moves alone."
     )
     spread = 0.1
 

@@ -46,8 +46,8 @@ class EncoderOffset(DisplacedMotion, OnJoint):
     name = "encoder-offset"
     summary = "The joint's encoder has a wrong zero: the posture of the arm differs from the recorded posture."
     separated_by = (
-        "The links are elsewhere than recorded: move that joint through a different range with the others still; the "
-        "offset remains constant, whereas an apparent mass error changes."
+        "The links are not where the recording places them: move that joint through a different range with the others "
+        "still; the offset remains constant, whereas an apparent mass error changes."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
@@ -102,8 +102,8 @@ class JointLatency(DisplacedMotion):
     name = "joint-latency"
     summary = "The recorded joint motion is late: the arm is already ahead of its recorded position."
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; the effects of body errors remain proportional to "
-        "the motion, whereas those of a delay grow with frequency."
+        "The error grows with speed: repeat the same motion twice as fast; the effects of body errors remain "
+        "proportional to the motion, whereas those of a delay grow with frequency."
     )
 
     @classmethod
@@ -146,7 +146,9 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     summary = (
         "The joint's gear is elastic: the bodies beyond the joint lag behind the encoder when the arm accelerates."
     )
-    separated_by = "It grows with the joint's acceleration: repeat the motion of that joint at twice the speed."
+    separated_by = (
+        "The deflection grows with the joint's acceleration: repeat the motion of that joint at twice the speed."
+    )
 
     def __init__(self, place: str = "", frequency: float = 1.0, spread: float = 0.7) -> None:
         super().__init__(place)

@@ -77,7 +77,7 @@ class GravityGradient(Effect):
         "a reading of an accelerometer that is not at the centre of mass."
     )
     separated_by = (
-        "It follows the direction of the Earth: repeat with the base in a different attitude, or with the arm "
+        "The torque follows the direction of the Earth: repeat with the base in a different attitude, or with the arm "
         "stretched along a different axis."
     )
     needs_orbit = True
@@ -192,7 +192,8 @@ class AerodynamicDrag(_Pressure):
     """Constant drag against the orbital motion, at a centre of pressure offset from the centre of mass.
 
     The prior's median of 5 mN is the drag of ten square metres at 350 km; its spread of 1.5 in the logarithm stands for
-    density and area. The centre of pressure lies within two metres of the base origin along each axis.
+    density and area. The prior of the centre of pressure is uniform within two metres of the base origin along each
+    axis, whatever the size of the robot; the largest torque is that on this robot's area.
     """
 
     name = "aerodynamic-drag"
@@ -200,7 +201,7 @@ class AerodynamicDrag(_Pressure):
         "The thin air of a low orbit exerts a force against the direction of flight. If the force is offset from "
         "the centre of mass, it also causes a torque, which depends on the attitude to the direction of flight."
     )
-    separated_by = "Its direction is fixed to the direction of flight: repeat with the base in a different attitude."
+    separated_by = "The force is fixed to the direction of flight: repeat with the base in a different attitude."
 
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
@@ -238,8 +239,8 @@ class SolarPressure(_Pressure):
         "torque about an axis perpendicular to the direction of the Sun."
     )
     separated_by = (
-        "Its direction is fixed to the Sun and it vanishes in eclipse: repeat with the base in a different attitude, "
-        "or in eclipse."
+        "The direction of the force is fixed to the Sun: repeat with the base in a different attitude, in sunlight. A "
+        "recording in eclipse, compared separately, must be free of it."
     )
     needs_latitude = True
 
@@ -266,14 +267,14 @@ class SolarPressure(_Pressure):
 class MagneticDipole(Effect):
     """Residual magnetic dipole of the base in the Earth's field, which is modelled as a dipole along the Earth's axis.
 
-    The prior of 10 A m2 is that of a small satellite without magnetic cleanliness.
+    The prior of 10 A m2 is that of a spacecraft of 1000 kg that was built without magnetic control.
     """
 
     name = "magnetic-dipole"
     summary = "Currents and magnets on board act like a compass needle in the Earth's magnetic field."
     separated_by = (
-        "It follows the Earth's field along the orbit: repeat a quarter of an orbit later, at a different argument of "
-        "latitude, and in a different attitude."
+        "The torque follows the Earth's field along the orbit: repeat a quarter of an orbit later, at a different "
+        "argument of latitude, and in a different attitude."
     )
     needs_latitude = True
     needs_orbit = True
@@ -313,9 +314,9 @@ class ThrusterLeak(Effect):
     name = "thruster-leak"
     summary = "A leaking valve exerts a constant force and torque that are fixed in the base."
     separated_by = (
-        "Its direction is fixed in the base: repeat with the base in a different attitude, so that forces fixed in the "
-        "orbit or in inertial space change their direction in base axes and the leak does not; also record with the "
-        "arm at rest."
+        "The direction of the leak is fixed in the base: repeat with the base in a different attitude, so that forces "
+        "fixed in the orbit or in inertial space change their direction in base axes and the leak does not; also "
+        "record with the arm at rest."
     )
 
     def __init__(self, force: float = 0.05, torque: float = 0.05) -> None:
@@ -352,7 +353,7 @@ class RotationalDrag(Effect):
 
     name = "rotational-drag"
     summary = "Air in a laboratory, or a bearing, damps the rotation of the base in proportion to its rate."
-    separated_by = "It damps every rotation: let the base rotate freely at two rates with the arm at rest."
+    separated_by = "The torque damps every rotation: let the base rotate freely at two rates with the arm at rest."
 
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")

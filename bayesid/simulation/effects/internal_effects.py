@@ -85,7 +85,7 @@ class WheelMomentum(Effect):
         "torque about another."
     )
     separated_by = (
-        "Its torque grows with the base's rate: repeat with the base rotating faster and about other axes; a torque "
+        "The torque grows with the base's rate: repeat with the base rotating faster and about other axes; a torque "
         "on a base that does not rotate is not caused by wheels at constant speed."
     )
 
@@ -110,7 +110,9 @@ class WheelMomentum(Effect):
 class _Vibration(Effect):
     """Common part of effects of a mass on a spring in the base."""
 
-    separated_by = "It continues to oscillate: excite it with one quick motion, then record with the arm at rest."
+    separated_by = (
+        "The oscillation continues after the motion: excite it with one quick motion, then record with the arm at rest."
+    )
     cause_kind = "vibration"
     frequency: float = FREQUENCY
 
@@ -193,8 +195,9 @@ class FlexibleAppendage(_Vibration):
 class FuelSlosh(_Vibration):
     """Fuel in a tank, as a mass on equal springs along three axes (Dodge 2000) that at rest is part of the base.
 
-    The prior's median is 10 kg with a spread of 1 in the logarithm; the tank lies within the spacecraft, which is taken
-    as one and a half times the uniform box of the base's mass and inertia, unless another half width is given.
+    The prior's median is 10 kg with a spread of 1 in the logarithm. The tank lies within a box one and a half times as
+    large as the uniform box with the base's mass and inertia; in Python, ``FuelSlosh(reach=...)`` sets another half
+    width [m].
     """
 
     name = "fuel-slosh"

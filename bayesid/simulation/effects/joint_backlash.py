@@ -69,10 +69,10 @@ class JointBacklash(DisplacedMotion, OnJoint):
     Waiting, with the friction of a bearing or cables: the link trails the encoder in the direction of its motion.
     When the joint reverses, the link stands still until the gap is crossed.
 
-    Leaping, also with friction: when the joint reverses, the link moves on evenly and the encoder crosses the gap
-    while the friction changes its sign, which takes longer, the slower the link is. Three parts, sharp, even
-    and soft, stand for three such speeds and allow for any friction. Their form is the one in the smoothed
-    recording.
+    Leaping, also with friction: when the motor reverses, the link keeps moving at an even rate while the motor side
+    crosses the gap and the friction changes its sign; the slower the motion, the longer this takes. Three shapes,
+    sharp, even and soft, stand for three speeds of crossing and together approximate any friction. They are shapes
+    after the smoothing of the recording.
     """
 
     name = "joint-backlash"
@@ -81,8 +81,8 @@ class JointBacklash(DisplacedMotion, OnJoint):
         "friction, when the joint reverses its motion."
     )
     separated_by = (
-        "It jumps when the joint's torque or motion reverses, by the same angle at any speed: accelerate and brake "
-        "that joint slowly and fast."
+        "The offset jumps when the joint's torque or motion reverses, by the same angle at any speed: accelerate and "
+        "brake that joint slowly and fast."
     )
 
     _kinds = ("coasting", "waiting", *(f"leaping.{name}" for name in CREEPING))

@@ -91,8 +91,8 @@ class JointFriction(_OnTorque):
     name = "joint-friction"
     summary = "The motor works against friction in the joint, which the torque sensor also measures."
     separated_by = (
-        "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant speeds in "
-        "both directions, with the others still."
+        "Friction changes sign with the joint's speed, not with its acceleration: run that joint at two constant "
+        "speeds in both directions, with the others still."
     )
 
     def __init__(self, place: str = "", coulomb: float = 5.0, viscous: float = 50.0) -> None:
@@ -121,7 +121,7 @@ class TorqueBias(_OnTorque):
     name = "torque-bias"
     summary = "The torque sensor of the joint reads a constant value without load."
     separated_by = (
-        "It is present when the joint carries no load: read the torques at rest, before and after the motion."
+        "The error is present when the joint carries no load: read the torques at rest, before and after the motion."
     )
 
     def __init__(self, place: str = "", sigma: float = 2.0) -> None:

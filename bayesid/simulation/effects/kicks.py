@@ -28,8 +28,8 @@ class Kicks(Events):
     Each kick gives the robot a momentum and an angular momentum, which are constant in inertial space from then on.
     The rate of the base jumps at the instant of the kick, whatever the integration step.
 
-    No sensor samples the push itself. The motion of the base depends only on the angular momentum of a kick about the
-    common centre of mass, so that is what a diagnosis reports.
+    The accelerometer has no sample during the push, so the motion of the base depends only on the angular momentum of a
+    kick about the common centre of mass, and that is what a diagnosis reports.
 
     Parameters
     ----------

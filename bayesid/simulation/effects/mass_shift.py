@@ -61,8 +61,8 @@ class MassShift(Effect):
         "inertia change at that instant."
     )
     separated_by = (
-        "It acts from one instant: the model fits the data before it, and no constant body fits both parts. Repeat the "
-        "manoeuvre: a loose part remains in its new place or moves again."
+        "The change acts from one instant: the model fits the data before it, and no constant body fits both parts. "
+        "Repeat the manoeuvre: a loose part remains in its new place or moves again."
     )
     cause_kind = "mass-shift"
     constant_names = ("instants",)

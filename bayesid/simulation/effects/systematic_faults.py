@@ -155,13 +155,13 @@ class _FaultByAxis(_FaultOfAnyKind):
 
 @register
 class SensorBias(_FaultByAxis):
-    """Constant error of a sensor; the default prior is that of `Instrument`."""
+    """Constant error of a sensor; the default prior is that of the type of sensor."""
 
     name = "SENSOR-bias"
     summary = "The {instrument} reads a constant value {idle}."
     separated_by = (
-        "It is present at rest and does not depend on motion: record longer rest periods before and after the motion, "
-        "and run the motion in reverse; readings caused by the motion change their sign, a bias does not."
+        "The error is present at rest and does not depend on motion: record longer rest periods before and after the "
+        "motion, with different motions in between."
     )
 
     @classmethod
@@ -193,8 +193,8 @@ class SensorDrift(_FaultByAxis):
     name = "SENSOR-drift"
     summary = "The {instrument}'s zero drifts steadily, for example during warm-up."
     separated_by = (
-        "It grows with time and does not depend on motion: record longer rest periods before and after the motion, and "
-        "repeat the motion in reverse."
+        "The error grows with time and does not depend on motion: record longer rest periods before and after the "
+        "motion."
     )
 
     @classmethod
@@ -229,7 +229,7 @@ class SensorScale(_FaultByAxis):
     name = "SENSOR-scale"
     summary = "The {instrument} reads too high or too low in proportion to {measures}."
     separated_by = (
-        "It grows with the reading: move in reverse and faster, with larger readings about each axis in turn."
+        "The error grows with the reading: move in reverse and faster, with larger readings on each axis in turn."
     )
 
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
@@ -248,7 +248,7 @@ class SensorMisalignment(_FaultByAxis):
 
     name = "SENSOR-misalignment"
     summary = "The {instrument} is rotated relative to its stated mounting."
-    separated_by = "It couples the axes: rotate about one axis at a time, with large readings."
+    separated_by = "The error couples the axes: excite one axis of the sensor at a time, with large readings."
 
     @classmethod
     def occurs_in(cls, kind: SensorKind) -> bool:
@@ -273,14 +273,15 @@ class SensorMisalignment(_FaultByAxis):
 class AccelPosition(SystematicFault):
     """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
 
-    The gravity gradient over the error is omitted, since it is below 2e-7 m/s2 for 5 cm in any orbit.
+    The gravity gradient over the error is omitted, since it is below 2e-7 m/s2 for 5 cm in any orbit; for an error of
+    several metres it reaches 1e-5 m/s2.
     """
 
     name = "accel-position"
     summary = "The accelerometer is not at its stated position and measures a different acceleration."
     separated_by = (
-        "It grows with the base's rate squared and angular acceleration: rotate the base faster about each axis in "
-        "turn."
+        "The error grows with the base's rate squared and angular acceleration: rotate the base faster about each axis "
+        "in turn."
     )
     sensor = SensorKind.ACCEL
 
@@ -318,7 +319,8 @@ class AttitudeMisalignment(SystematicFault):
     name = "attitude-misalignment"
     summary = "The star tracker is rotated relative to its stated mounting: every measured attitude has the same error."
     separated_by = (
-        "It is the same rotation in base axes at every attitude: rotate the base by large angles about each axis."
+        "The error is the same rotation in base axes at every attitude: rotate the base by large angles about each "
+        "axis."
     )
     sensor = SensorKind.ATTITUDE
 
@@ -341,8 +343,8 @@ class SensorLatency(_FaultOfAnyKind):
     name = "SENSOR-latency"
     summary = "The {instrument}'s samples are stamped late: each contains an earlier reading."
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; the effects of body errors remain proportional to "
-        "the motion, whereas those of a delay grow with frequency."
+        "The error grows with speed: repeat the same motion twice as fast; the effects of body errors remain "
+        "proportional to the motion, whereas those of a delay grow with frequency."
     )
 
     def __init__(self, sigma: float = 0.2) -> None:
@@ -359,15 +361,16 @@ class SensorLatency(_FaultOfAnyKind):
 
 @register
 class SensorClock(_FaultOfAnyKind):
-    """Error of a sensor's clock: stamped = true time (1 + rate); the prior is ten times a crystal's error.
+    """Error of a sensor's clock: stamped = true time (1 + rate); the prior is ten times the error of a crystal clock.
 
-    Where the clock is slow, the last samples lie after the end of the recording by ``-rate`` times its length.
+    If the clock is slow, the last samples were taken after the stamped end of the recording, by ``-rate`` times its
+    length.
     """
 
     name = "SENSOR-clock"
     summary = "The {instrument}'s clock runs fast or slow: its samples drift relative to the motion of the arm."
     separated_by = (
-        "It is a delay that grows with time: repeat the same motion early and late in one recording; a constant "
+        "The delay grows with time: repeat the same motion early and late in one recording; a constant "
         "delay is not a clock error."
     )
 

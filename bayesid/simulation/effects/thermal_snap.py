@@ -23,11 +23,12 @@ than the base and moves by centimetres."""
 class ThermalSnap(Events):
     """Angular momentum that a panel takes from the base at an instant, relative to it, base axes.
 
-    Either the panel takes the momentum at once and returns it with the decay time, if it bends as fast as its
+    There are two forms. In the first, the panel takes the momentum at once and returns it exponentially with the decay
+    time; afterwards the base has turned but is at rest again. This happens if the panel bends as fast as its
     temperature changes (J. D. Johnston and E. A. Thornton, Thermally induced dynamics of satellite solar panels,
-    Journal of Spacecraft and Rockets 37, 2000), so that the base has turned and is at rest again. Or it takes the
-    momentum with that time constant and retains it, which acts on the base as a torque that appears at once and
-    decays. An event's shape is the decay time [s], and 1 if the momentum is retained, else 0.
+    Journal of Spacecraft and Rockets 37, 2000). In the second, the panel takes the momentum gradually, with that time
+    constant, and keeps it; the base feels a torque that starts suddenly and decays. An event's shape is the decay time
+    [s], and 1 if the momentum is retained, else 0.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ class ThermalSnap(Events):
         "A panel or boom snaps, for example at sunrise or sunset: it exchanges momentum with the base and settles."
     )
     separated_by = (
-        "It occurs at sunrise or sunset and does not depend on motion: record at rest across both, and repeat the "
-        "motion at a different point of the orbit."
+        "The snap occurs at sunrise or sunset and does not depend on motion: record at rest across both, and repeat "
+        "the motion at a different point of the orbit."
     )
     amplitude = tuple((f"angular_momentum.{axis}", "N m s", 0.1) for axis in "xyz")
     trial_shapes = tuple((decay, kept) for kept in (0.0, 1.0) for decay in (2.0, 4.0, 8.0, 16.0))

@@ -61,8 +61,8 @@ class ThrusterPulses(Effect):
     name = "thruster-pulses"
     summary = "A thruster fires in pulses at regular intervals, with constant sign or alternating as in a limit cycle."
     separated_by = (
-        "The rates rise in steps, not steadily as with a leak: sample faster than the pulse length, and record longer "
-        "with the arm at rest; the steps follow the clock and not the motion."
+        "The rates rise in steps, not steadily as with a leak: sample at intervals shorter than a pulse, and record "
+        "longer with the arm at rest; the steps follow the clock and not the motion."
     )
     # with A the accumulated firing time, signs included, the angular momentum about the common centre of mass is
     # x = A (T - c x F) + u, with u' = -w x x + A c' x F

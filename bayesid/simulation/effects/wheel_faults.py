@@ -87,8 +87,8 @@ class WheelInertia(OnWheel):
     name = "wheel-inertia"
     summary = "The wheel's momentum differs from the product of its declared inertia and recorded speed."
     separated_by = (
-        "It grows with the wheel's acceleration: accelerate and decelerate this wheel with the others at constant "
-        "speed."
+        "The error grows with the wheel's acceleration: accelerate and decelerate this wheel with the others at "
+        "constant speed."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.3) -> None:
@@ -149,7 +149,7 @@ class WheelTilt(OnWheel):
     name = "wheel-tilt"
     summary = "The wheel's axis is slightly misaligned: its momentum also rotates the base about other axes."
     separated_by = (
-        "It rotates the base about axes normal to the wheel's: accelerate that wheel with the others at rest."
+        "The wheel rotates the base about axes normal to the wheel's: accelerate that wheel with the others at rest."
     )
 
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
@@ -189,7 +189,7 @@ class WheelLatency(OnWheel):
 
     name = "wheel-latency"
     summary = "The recorded speed of the wheel is late: the wheel reaches each speed before it is recorded."
-    separated_by = "It grows with the wheel's acceleration: accelerate the wheel twice as fast."
+    separated_by = "The error grows with the wheel's acceleration: accelerate the wheel twice as fast."
 
     def __init__(self, place: str = "", sigma: float = 0.2) -> None:
         super().__init__(place)
@@ -211,11 +211,12 @@ class WheelImbalance(OnWheel):
     """Imbalance of a wheel, which shakes the base at a multiple of its recorded speed; the phase differs by recording.
 
     The static imbalance is a first moment of mass off the axis: its force acts at the wheel's place, and turns the base
-    about the common centre of mass. The dynamic one is the momentum across the axis per speed. The line has order one
-    unless the scale of the recorded speed is wrong; the momenta and the force are those of the speed given by the
-    order. In the readings the line is as sharp as the smoothed speed, and the influence of the base's rotation on it is
-    neglected. Where the line lies above half the rate of the data that are used, blocks or samples, it is not a
-    candidate; ``blocks_per_second = 0`` uses all samples and raises that limit.
+    about the common centre of mass. The dynamic one is the momentum across the axis per speed. The disturbance is a
+    spectral line at order times recorded speed. The order is one unless the recorded speed is wrongly scaled; force and
+    momentum are those of the speed so corrected. The line is taken to be as narrow as the smoothed speed permits, and
+    the influence of the base's rotation on it is neglected. Where the line lies above half the rate of the data that
+    are used, blocks or samples, it is not a candidate; ``blocks_per_second = 0`` uses all samples and raises that
+    limit.
 
     Parameters
     ----------
@@ -230,8 +231,8 @@ class WheelImbalance(OnWheel):
     name = "wheel-imbalance"
     summary = "The wheel is unbalanced and shakes the base once per revolution."
     separated_by = (
-        "It shakes at the wheel's speed, with a force that grows with its square: accelerate this wheel slowly, with "
-        "the others at a different speed."
+        "The base shakes at the wheel's speed, with a force that grows with its square: accelerate this wheel slowly, "
+        "with the others at a different speed."
     )
     per_recording: ClassVar[bool] = True
     cause_kind: ClassVar[str] = "order-line"

@@ -65,8 +65,8 @@ class WheelHistory(Placed):
         "base and makes it a gyroscope."
     )
     separated_by = (
-        "It returns its momentum to the base when it stops, and it acts with the arm at rest: record longer rest "
-        "periods before and after the motion, and repeat the motion: the speed of the wheel need not repeat with it."
+        "The wheel returns its momentum to the base when it stops, and acts with the arm at rest: record longer rest "
+        "periods before and after the motion. Repeat the motion; the speed of the wheel need not repeat with it."
     )
     per_recording: ClassVar[bool] = True
     constant_names = ("end",)

@@ -86,8 +86,9 @@ def reading(folder: Path) -> str:
     """Return what the picture of the effect states."""
     x = _sizes(folder)["x"]
     return (
-        "The recordings were simulated with a torque that the study does not mention. The example class above, named "
-        f"under `plugins` and `effects`, recovers it: x is {1e3 * x['mean']:.4f} ± "
+        "A torque was added as `base_torque` to the planned motion, the sensors were simulated, and its columns were "
+        "removed (`studies/manual/pictures/effect.py` does both). A study that names the class above, stored as "
+        f"`steady_torque.py`, under `plugins` and `effects` recovers it: x is {1e3 * x['mean']:.4f} ± "
         f"{1e3 * x['sd']:.4f} mN m, where {1e3 * TRUE[0]:g} mN m acted. Right: all three components "
         "agree with the truth within their 95 % intervals, which are far narrower than the prior."
     )

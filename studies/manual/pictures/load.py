@@ -62,11 +62,13 @@ def draw(folder: Path) -> Figure:
 def reading(folder: Path) -> str:
     """Return what the picture of the load states."""
     _, _, guess, prior, mean, sd, truth = next(_values(folder))
+    factor = float(np.exp(np.arcsinh(prior / guess)))
     return (
-        f"The guess of {format_number(guess)} kg, whose prior (orange) has a central 68 % interval of ± "
-        f"{format_number(prior, 2)} kg, becomes {format_number(mean)} ± {format_number(sd, 2)} kg (1 sigma); the "
-        f"simulated load has {format_number(truth)} kg. The centre of mass moves from the guess to the truth. The base "
-        "and the arm, which give the scale, limit the accuracy of the mass."
+        f"The guess of {format_number(guess)} kg has a log-normal prior (orange), whose central 68 % interval is "
+        f"{format_number(guess / factor, 2)} to {format_number(guess * factor, 2)} kg; the posterior is "
+        f"{format_number(mean)} ± {format_number(sd, 2)} kg (1 sigma). The simulated load has a mass of "
+        f"{format_number(truth)} kg. The centre of mass moves from the guess to the truth. The base and the arm, which "
+        "give the scale, limit the accuracy of the mass."
     )
 
 

@@ -53,9 +53,10 @@ def reading(folder: Path) -> str:
     best = advice[0]
     left = best["worst_parameter"]["sd"] / sd
     return (
-        f"With the sensors as they are, the worst known parameter is {name} (sd {format_number(sd, 2)} "
-        f"{unit.replace('kg m2', 'kg m²')}). The shorter the bar, the more a candidate helps: the best one, "
-        f"“{best['text']}”, would reduce the sd to {format_number(100.0 * left, 2)} % of that."
+        f"With the sensors as they are, the parameter least well determined relative to its prior is {name} (sd "
+        f"{format_number(sd, 2)} {unit.replace('kg m2', 'kg m²')}). The shorter the bar, the more a candidate helps: "
+        f"the best one, “{best['text']}”, would reduce its sd to {format_number(100.0 * left, 2)} % of the present "
+        "value."
     )
 
 
