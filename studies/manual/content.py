@@ -27,6 +27,8 @@ from studies.manual import interface
 
 Pieces = list[str]  # a text in pieces: plain, code, plain, and so on
 
+TABLE = re.compile(r'"[^"]+" = \{[^}]*\}')  # a line of a study in a description, which is code
+
 # description of the package, which states its version and the order of its packages
 PROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
 
@@ -120,7 +122,7 @@ def _sections() -> Iterator[dict[str, Any]]:
         required = made.get("required", ())
         keys: list[dict[str, Any]] = []
         for key, value in made["properties"].items():
-            text = _pieces(value.get("description", ""))
+            text = _pieces(TABLE.sub("`\\g<0>`", value.get("description", "")))
             default = value.get("default")
             default = str(default).lower() if isinstance(default, bool) else _default(default)
             row = {"value": _type(value), "default": default, "text": text}

@@ -577,7 +577,7 @@ def _diagnosis(document: Document, result: Result) -> None:
         document.paragraph(
             "Without the recorded wheel, the chi-square per sample of the present model is "
             f"{format_number(min(chi2), 2)} to {format_number(max(chi2), 2)}. On {unfitted} of {len(result.wheels)} "
-            "bodies it cannot follow the data: their parameters were held at the prior, and the effect of each cause "
+            "bodies it cannot follow the data: their parameters were fixed at the prior, and the effect of each cause "
             f"was computed along the measured motion. These diagnoses took {minutes} minutes."
         )
 

@@ -69,8 +69,8 @@ class JointBacklash(DisplacedMotion, OnJoint):
     Waiting, with the friction of a bearing or cables: the link trails the encoder in the direction of its motion.
     When the joint reverses, the link stands still until the gap is crossed.
 
-    Leaping, also with friction: when the motor reverses, the link keeps moving at an even rate while the motor side
-    crosses the gap and the friction changes its sign; the slower the motion, the longer this takes. Three shapes,
+    Leaping, also with friction: when the motor reverses, the link continues to move at an even rate while the motor
+    side crosses the gap and the friction changes its sign; the slower the motion, the longer this takes. Three shapes,
     sharp, even and soft, stand for three speeds of crossing and together approximate any friction. They are shapes
     after the smoothing of the recording.
     """

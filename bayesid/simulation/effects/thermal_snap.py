@@ -27,8 +27,8 @@ class ThermalSnap(Events):
     time; afterwards the base has turned but is at rest again. This happens if the panel bends as fast as its
     temperature changes (J. D. Johnston and E. A. Thornton, Thermally induced dynamics of satellite solar panels,
     Journal of Spacecraft and Rockets 37, 2000). In the second, the panel takes the momentum gradually, with that time
-    constant, and keeps it; the base feels a torque that starts suddenly and decays. An event's shape is the decay time
-    [s], and 1 if the momentum is retained, else 0.
+    constant, and retains it; the base feels a torque that starts suddenly and decays. An event's shape is the decay
+    time [s], and 1 if the momentum is retained, else 0.
 
     Parameters
     ----------
