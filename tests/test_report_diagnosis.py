@@ -885,8 +885,12 @@ def test_without_a_record_the_box_has_none(biased):
     )
     assert "accel 3.2 × 10⁻⁵ before, 1.7 × 10⁻⁵ after (noise alone 1.7 × 10⁻⁵) m/s²" in entries["Changes"]
     change = biased.motion_change
-    assert f"the predicted base rate by up to {format_number(change.rate, 2)} rad/s" in entries["Changes"]
-    assert f"of {change.tip_frame} by up to {format_number(1e3 * change.tip, 2)} mm." in entries["Changes"]
+    assert (
+        f"the predicted base rate would be wrong by up to {format_number(change.rate, 2)} rad/s" in entries["Changes"]
+    )
+    assert (
+        f"of {change.tip_frame} would be wrong by up to {format_number(1e3 * change.tip, 2)} mm." in entries["Changes"]
+    )
 
 
 def test_plots_of_a_diagnosis_take_axes(biased, disturbance):

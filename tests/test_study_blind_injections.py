@@ -215,7 +215,7 @@ def test_one_kind_of_outside_effect_must_not_be_misnamed_however_few_others_are(
     assert _worst_kind([]).verdict is Verdict.NOT_TESTED
     assert _worst_kind([aside] * 90 + [named] + [quiet] * 9).verdict is Verdict.PASS
     assert _worst_kind([aside] * 90 + [named] * 2 + [quiet] * 8).verdict is Verdict.FAIL
-    assert "2 of 10 (curved-gyro), 2 kinds" in _worst_kind([aside] * 90 + [named] * 2 + [quiet] * 8).reached
+    assert "worst of 2 kinds: curved-gyro, 2 of 10" in _worst_kind([aside] * 90 + [named] * 2 + [quiet] * 8).reached
     assert not surely_misnamed(replace(named, probability=0.89))
     assert not surely_misnamed(replace(named, accept=("rate-bias",)))
 

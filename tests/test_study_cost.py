@@ -81,7 +81,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     STUDY.write(cost, tmp_path / "cost.pdf")
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that bound" in text  # 200 µs over 6e5 operations at 3e10 a second
-    assert "5 s (nothing, leak, payload and link), missed by 2 of 4" in text
+    assert "The limit of 5 s (nothing hidden, leak, payload and link error) is missed in 2 of 4 cases." in text
     assert "4 of 9 goals are missed" in text
     assert "each of 46 candidates would take more than 1000 times as long" in text  # 100 s for each over 4.6 s
     assert "takes 31.0 ms on one core" in text

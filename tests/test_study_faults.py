@@ -66,7 +66,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     STUDY.write(Result(made, ["a trial broke"]), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
     assert text.row("No unclear answer to a corrupted file", "1 of 7; 4 refused, 2 accepted", "FAIL")
-    around = f"One clear error: {joined(SURROUNDINGS)}"
+    around = f"Each of these gives exactly one clear error message: {joined(SURROUNDINGS)}"
     others = joined([title for title in SURROUNDINGS if title != FULL])
     reached = f"1 of {len(SURROUNDINGS)}; not run (see tests/test_faults.py): {others}"
     assert text.row(around, reached, "NOT DECIDED")
@@ -93,8 +93,13 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
 @pytest.mark.parametrize(
     ("same", "differs", "reached", "verdict"),
     [
-        (True, True, "same result as with an empty cache; the other version gives another result", "PASS"),
-        (False, True, "different result than with an empty cache; the other version gives another result", "FAIL"),
+        (True, True, "the same result as with an empty cache; the other version gives another result", "PASS"),
+        (
+            False,
+            True,
+            "a result that differs from that with an empty cache; the other version gives another result",
+            "FAIL",
+        ),
         (True, False, "not decisive: the other version gives the same result", "NOT TESTED"),
     ],
 )

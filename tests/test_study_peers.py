@@ -96,7 +96,7 @@ def test_the_fastest_peer_is_one_with_an_estimate():
         goals = {goal.text: goal.reached for goal in goals_of([own, *made])}
         return goals["at least 5 times faster than the best peer, 10, 19 and 39 unknowns"].partition("39 unknowns: ")[2]
 
-    assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)), 1 other more than 6.0")
+    assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)), 1 other at least 6.0")
     assert reached(cut).startswith("more than 6.0 (1 peer, none with an estimate)")
 
 

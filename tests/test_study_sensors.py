@@ -216,7 +216,7 @@ def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_ho
     joints = [{"level": {LIKELIHOOD: wide, EXACT: exact}} for exact in (right, wide)]
     results = [SimpleNamespace(joints=each, smoothing=smoothing) for each in joints]
     named, unknown = (_failing(result, "level") for result in results)
-    assert "noise of the encoders" in named
+    assert "it is the propagated encoder noise that is misstated" in named
     assert "0.95, 0.85 and 0.73 times" in named
     assert "the cause is not known" in unknown
 
