@@ -114,7 +114,7 @@ CHANGES = dict(
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
 
 Made = Mapping[str, Any]  # a task with its result
-STATED = re.compile(r"\[\w+\] (unit|time_unit) = ")  # lines of a study in a message that put a unit right
+STATED = re.compile(r"\[[\w.]+\] (unit|time_unit) = ")  # lines of a study in a message that put a unit right
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,8 @@ def _report(result: Result) -> Report[Result]:
         f"{sum(task['same'] for task in killed.values())} of {counted(len(killed), 'command')} gave the same result as "
         "an uninterrupted run.",
         goals=_goals(result),
-        valid=f"the files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} "
-        "trials of the full study were run.",
+        valid="the files are those of a robot with three joints and one recording of 40 s"
+        + ("." if done >= planned else f"; {done} of the {planned} trials of the full study were run."),
         full=done >= planned,
         figure=Picture(answer_figure(result.answers), caption) if result.spoilt else None,
         sections=[_failures, _kills, _said, _conditions],
