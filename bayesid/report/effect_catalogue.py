@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis.candidates.initial_rate import LARGEST
 from bayesid.diagnosis.noise import noise_faults
 from bayesid.report.numbers import format_number, format_text, format_unit
 from bayesid.robot.body_prior import BodyPrior
@@ -213,7 +214,8 @@ def _entries_of_noise() -> list[CatalogueEntry]:
     start = CatalogueEntry(
         name="initial-rate",
         summary="The base was already turning when the recording began; the model assumes that it starts from rest.",
-        parameters=("x, y, z [rad/s]: normal, separate in every recording",),
+        parameters=("x, y, z [rad/s]: normal, mean 0, separate in every recording",),
+        sizes=(f"of any robot: {LARGEST:g} rad/s. A base that turns faster would not be taken for one at rest.",),
         needs=('initial_rate = "zero" in [model]',),
     )
     faults = {fault.entry: fault for fault in noise_faults().values()}

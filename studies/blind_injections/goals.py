@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy import stats
 
+from bayesid._io.words import counted
 from bayesid.diagnosis import Status
 from bayesid.report.numbers import NO_VALUE
 from bayesid.report.verdict_record import Share
@@ -60,7 +61,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     inside = [trial for trial in trials if trial.kind != "unknown"]
     outside = [trial for trial in trials if trial.kind == "unknown"]
     clear = [t for t in inside if t.kind == "effect" and (t.signal_to_noise or 0.0) >= CLEAR]
-    pairs = [t for t in inside if len(t.hidden) > 1 and len(t.causes) == 1 and t.holds and t.remainder is not None]
+    halves = [t for t in inside if len(t.hidden) > 1 and len(t.causes) == 1 and t.holds]
     left = [t for t in outside if (t.signal_to_noise or 0.0) >= LEFT]
     limited = [t for t in clear if t.detection is not None and t.naming is not None]
     amplitudes = np.array([e for t in trials if t.named_rightly for e in t.amplitude_errors])
@@ -71,12 +72,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
         _reliable(inside),
         _relative(f"Inside, named alone at {CLEAR:g} sigma or more, relative to the simulated limit", 0.97, limited),
         _least(f"Inside, in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
-        _least(
-            "Inside, one of two hidden causes named: a remainder is stated, or undecided",
-            0.95,
-            sum(t.remainder != "none" for t in pairs),
-            len(pairs),
-        ),
+        _remainders(halves),
         _most(
             f"Outside: a wrong cause named at {SURE:g} or more",
             FEW_OUTSIDE,
@@ -96,6 +92,16 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
         _scatter("base parameters", bodies),
         _most("Basilisk as truth: false alarms and wrong names", 0.03, _wrong(flown), len(flown)),
     ]
+
+
+def _remainders(halves: Sequence[Trial]) -> Goal:
+    """Return the goal on the remainder where one of two hidden causes is named; early trials did not state any."""
+    stated = [trial for trial in halves if trial.remainder is not None]
+    text = "Inside, one of two hidden causes named: a remainder is stated, or undecided"
+    goal = _least(text, 0.95, sum(trial.remainder != "none" for trial in stated), len(stated))
+    if stated or not halves:
+        return goal
+    return replace(goal, reached=f"{counted(len(halves), 'trial')}, by a version that stated no remainder")
 
 
 def surely_misnamed(trial: Trial) -> bool:

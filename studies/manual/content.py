@@ -48,7 +48,7 @@ def content() -> dict[str, Any]:
         "packages": list(_packages(project["tool"]["importlinter"]["contracts"][0]["layers"])),
         "names": [{"name": name, "text": _first(getattr(bayesid, name))} for name in sorted(bayesid.__all__)],
         "hooks": [
-            {"name": name, "text": _first(value)}
+            {"name": name, "arguments": _arguments(value), "text": _first(value)}
             for name, value in vars(Effect).items()
             if not name.startswith("_")
             and name != "uses"
@@ -214,6 +214,14 @@ def _in_pieces(entry: Any) -> Any:
         key: _pieces(value) if key == "text" else _in_pieces(value) if isinstance(value, list) else value
         for key, value in entry.items()
     }
+
+
+def _arguments(hook: Any) -> str:
+    """Return the arguments of a method as it is called, nothing for a property."""
+    if isinstance(hook, property):
+        return ""
+    names = list(inspect.signature(getattr(hook, "__func__", hook)).parameters)
+    return f"({', '.join(names[1:])})"
 
 
 def _first(described: Any) -> Pieces:
