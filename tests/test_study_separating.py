@@ -13,7 +13,7 @@ from bayesid.report.verdict_record import Share
 from bayesid.robot.joint_state import JointState
 from studies.common import mission
 from studies.common.study import Verdict
-from studies.separating.analysis import LAST, NEEDED, STAGES, Linearised, PairResult, Realised
+from studies.separating.analysis import LAST, NEEDED, STAGES, Linearised, PairResult, Realised, rival_model
 from studies.separating.pairs import ERROR, HAND, LEAK, LINK, PAIRS, PAYLOAD, PULSES
 from studies.separating.report import _is_full, decided, judged
 
@@ -121,6 +121,18 @@ def test_a_rate_is_judged_by_its_interval_and_against_the_prediction():
     assert off.deviation(realised, LAST) == pytest.approx(-0.1 / np.sqrt(0.09 / 400), rel=0.01)
     never, realised = result_with(0, 400, 0.0)
     assert never.deviation(realised, LAST) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_every_pair_has_a_model_and_a_truth(name):
+    """A field that the truth does not know, such as a magnetic one without an inclination, would stop a long run."""
+    pair, nominal = PAIRS[name], mission.published_robot()
+    assert set(pair.labels) <= {effect.label for effect in rival_model(pair).effects}
+    for cause in pair.causes:
+        robot, hidden = cause.hide(cause.turned(np.random.default_rng(0)), nominal)
+        pushed = [np.any(field(8.0, np.eye(3), np.zeros(3))[1]) for field in hidden.get("fields", ())]
+        heavier = [np.any(robot.link(k).inertial.vector != nominal.link(k).inertial.vector) for k in (HAND, LINK)]
+        assert any((*pushed, *heavier, "rotor" in hidden))
 
 
 @pytest.mark.usefixtures("slow")

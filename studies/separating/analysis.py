@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-from bayesid import Manoeuvre, Model
+from bayesid import Manoeuvre, Model, Orbit
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.double_precision import in_double_precision
 from bayesid.design import THOROUGH, DecisionRate, DOptimal, Problem, Search, Separation, Store, optimise
@@ -23,11 +23,11 @@ from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.joint_motion import Motion
 from studies.common import mission
-from studies.common.ets7 import BIAS
+from studies.common.ets7 import BIAS, RADIUS
 from studies.common.models import ARM_SPREAD
 from studies.common.monte_carlo import run_trials
 from studies.common.repeated_fits import Reference
-from studies.separating.pairs import PAIRS, Cause, Pair
+from studies.separating.pairs import INCLINATION, PAIRS, Cause, Pair
 
 # stages of the study, with the manoeuvres that are fitted together in each
 STAGES = {
@@ -53,6 +53,7 @@ PREDICTED = 20_000  # number of draws behind a predicted rate
 def rival_model(pair: Pair, arm_spread: float = ARM_SPREAD) -> Model:
     """Return the mission's model with both causes."""
     model = mission.base_unknown(arm_spread, base_spread=SPREAD)
+    model = replace(model, orbit=Orbit(RADIUS, inclination=INCLINATION))
     for cause in pair.causes:
         model = model.extend(cause.effect)
     return model

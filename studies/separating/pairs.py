@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax.numpy as jnp
@@ -24,6 +24,7 @@ Hidden = tuple[Robot, dict[str, Any]]  # the robot as it truly is, and what else
 
 PERIOD, PULSE, FIRST = 20.0, 4.0, 7.0  # train of pulses: from one to the next, length, and beginning of the first [s]
 HAND, LINK = "link6", "link3"  # links with the payload and with the error
+INCLINATION = 0.611  # of the orbit of ETS-VII, 35 degrees [rad]; only the magnetic field depends on it
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ PULSES = _vector(
 )  # fmt: skip
 DIPOLE = _vector(
     MagneticDipole(), "dipole", "dipole of −9, 5, 11 A m²", (-9.0, 5.0, 11.0),
-    lambda vector: {"fields": [magnet(ORBIT, vector)]},
+    lambda vector: {"fields": [magnet(replace(ORBIT, inclination=INCLINATION), vector)]},
 )  # fmt: skip
 PAYLOAD = Cause(
     Payload(HAND), "payload", "payload of 5 kg at 0.3 m from the origin of the hand",
