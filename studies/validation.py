@@ -120,6 +120,8 @@ def _goals(document: Document, goals: Sequence[Judged], verdict: Verdict) -> Non
     if verdict is Verdict.FAIL:
         header.append("severity")
         caption += f" Severity: {severities()}."
+        if any(goal.severity == UNSTATED for goal in goals):
+            caption += " Summaries written before 0.3.0 state none."
         rows = [
             [*row, name]
             for name in (*(severity.value for severity in Severity), UNSTATED)
