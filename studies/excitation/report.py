@@ -260,7 +260,8 @@ def _report(result: Result) -> Report[Result]:
             manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight rule "
             f"allows. The paper's manoeuvre (coefficients of section 4.1) had to be reduced to "
             f"{format_percent(shrink['printed'], 2)} of its amplitudes, and its weaker variant to "
-            f"{format_percent(shrink['poor'], 2)}.",
+            f"{format_percent(shrink['poor'], 2)}. In Eq. (26) as printed most terms cancel, since its differences "
+            "have signs; corrected, it takes their magnitudes.",
             sensors=f"{mission.SENSORS}; the encoders' noise is part of every criterion.",
             known="The gravity gradient, the attitude at the start, and the arm with each link's mass uncertain by 5 % "
             "(1 sigma).",
