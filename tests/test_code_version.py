@@ -109,7 +109,7 @@ def test_figures_of_other_code_are_refused_and_those_of_another_commit_are_not()
         "faults": {"versions": []},
     }
     first, second = refusals(summaries)
-    assert first.startswith("sensors: Figures were made by bayesid 0.1.0")
+    assert first.startswith("sensors: The numbers were made by bayesid 0.1.0")
     assert second == "faults: no version is stated. Run python -m studies.faults --full"
 
 

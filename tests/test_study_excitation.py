@@ -153,14 +153,14 @@ def test_the_whole_study_small(tmp_path):
     for away, verdict in ((0.1, Verdict.PASS), (0.3, Verdict.FAIL)):  # 1 and 3 % of each of ten deviations
         rivals = {"one": Rivals(cost, cost + away), "two": Rivals(cost, cost - 1.0)}
         searched = replace(result, crowds=crowds, searches=Searches(np.zeros(1), np.array([cost])), rivals=rivals)
-        (robots,) = (goal for goal in goals(searched) if goal.text.startswith("On 3 robots"))
+        (robots,) = (goal for goal in goals(searched) if goal.text.startswith("On each of 3 robots"))
         assert robots.verdict is verdict
     for count, verdict in ((1, Verdict.OPEN), (3, Verdict.PASS)):
         searches = Searches(np.zeros(1), np.full(count, cost))
         (largest,) = (
             goal
             for goal in goals(replace(result, crowds=crowds, searches=searches))
-            if goal.text.startswith("Largest factor")
+            if goal.text.startswith("At least 3 searches")
         )
         assert largest.verdict is verdict  # with the crowd's own, two and four followed searches agree
 
