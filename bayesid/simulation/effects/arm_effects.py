@@ -107,11 +107,11 @@ class _OnLink(Placed):
         return vector_from_factor(factor, values) - vector_from_factor(factor, jnp.zeros(len(LOG_CHOLESKY)))
 
     @property
-    def _attached(self) -> tuple[Array, Array]:
-        """Factor of the nominal link's pseudo-inertia and its ten parameters."""
+    def _attached(self) -> tuple[Floats, Floats]:
+        """Factor of the nominal link's pseudo-inertia and its ten parameters, also where a function is being traced."""
         if self.factor is None or self.vector is None:
             raise InputError(f"effect {self.label!r} does not yet belong to a model", remedy="Add it to a Model")
-        return jnp.asarray(self.factor), jnp.asarray(self.vector)
+        return self.factor, self.vector
 
 
 class _LinkMoments(Placed):
@@ -125,7 +125,7 @@ class _LinkMoments(Placed):
         self.kind = effect
         _, vector = effect._attached
         mass = float(vector[0])
-        extent = float(np.sqrt(np.abs(np.asarray(vector)[[4, 6, 9]]).max() / mass))
+        extent = float(np.sqrt(np.abs(vector[[4, 6, 9]]).max() / mass))
         powers = {"kg": 0, "kg m": 1, "kg m2": 2}
         self.parameters = tuple(
             Parameter(moment.name, moment.unit, effect.spread * mass * extent ** powers[moment.unit])
