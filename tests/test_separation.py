@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import jax
 import numpy as np
 import pytest
 from scipy.special import digamma, logsumexp
@@ -225,3 +226,11 @@ def test_a_payload_is_weighed_in_the_moments_in_which_it_is_linear():
     scale = np.sqrt(np.abs(np.diag(shown[1])) + 1e-3)
     np.testing.assert_allclose(shown[0] / np.outer(scale, scale), shown[1] / np.outer(scale, scale), atol=1e-3)
     assert np.diag(shown[0]).max() > 1.0
+
+
+def test_a_payload_is_weighed_while_a_search_is_traced():
+    own = plan(effects=(Steady(), Payload("part").attach(plan().model.robot)), unknown=False)
+    criterion = Separation(("steady", "payload:part"))
+    change, _ = in_double_precision(criterion.coordinates)(own)
+    traced = in_double_precision(jax.jit(lambda scale: scale * criterion.coordinates(own)[0]))(1.0)
+    np.testing.assert_allclose(traced, change)
