@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid import InputError
 from bayesid.design import Store
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
@@ -282,12 +283,18 @@ def _run(
     seed: int,
     store: Path | None,
     pairs: Sequence[str] | None = None,
-    flights: int | None = None,
+    flights: Sequence[int] = (),
     **options: Any,
 ) -> Result:
     """Run the study, the results of its searches kept in a file where one is given."""
     chosen = pairs or (list(SETS) if full else list(SETS)[:1])
-    sets = {name: flights or (SETS[name] if full else QUICK_SETS) for name in chosen}
+    counts = [*flights] or [SETS[name] if full else QUICK_SETS for name in chosen]
+    counts *= len(chosen) if len(counts) == 1 else 1
+    if len(counts) != len(chosen):
+        raise InputError(
+            f"--flights has {len(counts)} numbers for {len(chosen)} pairs", remedy="Give one for each pair"
+        )
+    sets = dict(zip(chosen, counts, strict=True))
     kept = (
         None if store is None else Store.open(store, f"separating {seed} {analysis.FULL if full else analysis.QUICK}")
     )
@@ -304,7 +311,12 @@ STUDY = Study(
     seed=1,
     extra={
         "--store": {"type": Path, "help": "file for the results of the searches, to resume an interrupted run"},
-        "--flights": {"type": int, "help": "number of sets of flights for each cause and direction"},
+        "--flights": {
+            "type": int,
+            "nargs": "+",
+            "default": [],
+            "help": "number of sets of flights for each cause and direction, one for all pairs or one for each",
+        },
         "--pairs": {"nargs": "+", "choices": list(SETS), "help": "pairs of causes, by default the first or all"},
         "--trials": TRIALS["--trials"],
     },
