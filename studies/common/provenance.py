@@ -38,7 +38,9 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
     words = ["python", "-m", f"studies.{name}", *flags]
     words += [] if seed is None else ["--seed", str(seed)]
     counts = {key: getattr(options, key, None) for key in COUNTS}
-    words += [word for key, count in counts.items() if count is not None for word in (f"--{key}", str(count))]
+    for key, count in counts.items():
+        if count:
+            words += [f"--{key}", *map(str, count if isinstance(count, list) else [count])]
     now = f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. "
     if not getattr(options, "made", False):
         return now + origin_text(inputs, words, seed)

@@ -286,7 +286,10 @@ class Study(Command, Generic[R]):
         chosen = {name: value for name, value in vars(options).items() if name != "output"}
         result = self.run(**chosen, progress=show)
         store = getattr(options, "trials", None)
-        versions = CodeVersion.of_trials(store) if store is not None and store.is_file() else []
+        # one study may store its trials in several files, named after the one that is given
+        stores = [] if store is None else [store, *sorted(store.parent.glob(f"{store.stem}-*{store.suffix}"))]
+        made_by = (version for file in stores if file.is_file() for version in CodeVersion.of_trials(file))
+        versions = list(dict.fromkeys(made_by))
         self.write(result, options.output, study_origin(self.name, options, self.inputs(options)), versions)
         show(f"Wrote {options.output}.")
 
