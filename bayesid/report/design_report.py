@@ -193,7 +193,7 @@ def separation_sentence(design: Design) -> str:
     return (
         f"{design.name} distinguishes {joined(criterion.rivals)}: a probability of {format_number(DECISION)} or more "
         f"for the correct one, both equally probable beforehand, is expected from {joined(rates)}. Sizes and "
-        "directions follow the prior of a diagnosis: sizes are evenly distributed in the logarithm, from those that no "
+        "directions follow the prior of a diagnosis: sizes are log-uniform, from those that no "
         "manoeuvre resolves to the largest plausible ones."
     )
 
