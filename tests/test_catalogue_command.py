@@ -111,7 +111,7 @@ def test_sizes_are_those_of_a_study_with_its_plugins(tmp_path):
     try:
         status, output = run("wheel-momentum", "--study", study)
         assert status == 0, output
-        assert "Largest size for servicer" in output
+        assert "Largest size of x, y, z for servicer" in output
         status, output = run("steady-torque", "--study", study)
         assert status == 0, output
         assert "A torque that never changes" in output

@@ -23,7 +23,10 @@ def run(
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts per criterion.")] = 12,
     iterations: Annotated[int, typer.Option(min=1, help="Maximum number of optimiser iterations per start.")] = 400,
     thorough: Annotated[
-        bool, typer.Option(help="Search more widely, also between the best motions; takes about five times as long.")
+        bool,
+        typer.Option(
+            help="Search more thoroughly, including combinations of the best motions; takes about five times as long."
+        ),
     ] = False,
     separate: Annotated[
         tuple[str, str] | None,

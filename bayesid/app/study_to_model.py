@@ -73,8 +73,10 @@ def load_posterior(
     Parameters
     ----------
     study : Study or path
+        Path of a study file, or the study that was read from it.
     window : int, optional
-        As for `Posterior.of`.
+        Number of earlier blocks on which the whitening conditions each sample, by default the smallest that is
+        accurate.
     progress : Progress, optional
         Receiver of the share of the recordings that is read.
     executor : concurrent.futures.Executor, optional
@@ -210,6 +212,7 @@ def load_manoeuvres(
     Parameters
     ----------
     study : Study or path
+        Path of a study file, or the study that was read from it.
     robot : Robot
     progress : Progress, optional
         Receiver of the share that is read.

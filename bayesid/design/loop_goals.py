@@ -264,6 +264,7 @@ class Reviewer(Protocol):
         manoeuvres : sequence of Manoeuvre
             All manoeuvres flown so far.
         seed : int
+            Seed of all random numbers.
         file : Path
         """
         ...

@@ -78,6 +78,7 @@ class Diagnosis(ShortForm):
     bounds : mapping of str to tuple of PhysicalBound
         Largest plausible size of each candidate.
     seed : int
+        Seed of all random numbers.
     seconds : dict of str to float
         Time by phase.
     identification : Identification or None

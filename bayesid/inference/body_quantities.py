@@ -68,6 +68,7 @@ class QuantityDraws(ShortForm):
     draws : (draws,) array
         Draws, in the unit.
     unit : str
+        Unit of the quantity.
     """
 
     draws: Floats
@@ -276,6 +277,7 @@ def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
     mean, sd : float
         In the unit.
     unit : str
+        Unit of the quantity.
     """
     return {"mean": float(mean), "sd": float(sd), "unit": unit}
 

@@ -100,7 +100,7 @@ class SensorCheck:
     sigma : (3,) array
         Declared standard deviation of the white noise.
     measured_sigma : (3,) array or None
-        Standard deviation estimated from quiet stretches; None if there are too few quiet samples.
+        Standard deviation estimated from quiet periods; None if there are too few quiet samples.
     sigma_error : float
         Relative standard error of ``measured_sigma``.
     delay : pair of float or None
@@ -190,7 +190,7 @@ class RecordingCheck:
                 off = np.abs(sensor.measured_sigma / sensor.sigma - 1.0)
                 if (off > max(0.3, 4.0 * sensor.sigma_error)).any():
                     sentences.append(
-                        f"The noise of {sensor.kind.value} in quiet stretches is "
+                        f"The noise of {sensor.kind.value} in quiet periods is "
                         f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}; declared: "
                         f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
                     )
@@ -221,6 +221,7 @@ def check_recordings(posterior: Posterior, progress: Progress = silent) -> list[
     ----------
     posterior : Posterior
     progress : Progress, optional
+        Receiver of messages and of the share that is done.
     """
     predicted = readings_at_start(posterior)
     checks: list[RecordingCheck] = []

@@ -10,15 +10,16 @@ from itertools import groupby
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.candidates.initial_rate import LARGEST
 from bayesid.diagnosis.noise import noise_faults
+from bayesid.diagnosis.noise.noise_fault import NoiseFault
 from bayesid.report.numbers import format_number, format_text, format_unit
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
-from bayesid.simulation.model import Model
+from bayesid.simulation.model import RATE_SIGMA, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 
@@ -145,15 +146,18 @@ def _parameters(effect: Effect) -> tuple[str, ...]:
     if effect.per_recording:
         lines.append("with separate values in every recording")
     if [quantity.name for quantity in effect.quantities] != [parameter.name for parameter in effect.parameters]:
-        reported = ", ".join(f"{quantity.name} [{_unit(quantity.unit)}]" for quantity in effect.quantities)
-        lines.append(f"reported as {reported}")
+        alike = [list(group) for _, group in groupby(effect.quantities, key=lambda quantity: quantity.unit)]
+        lines.append(f"reported as {', '.join(f'{_names(group)} [{_unit(group[0].unit)}]' for group in alike)}")
     return tuple(lines)
 
 
 def _group(group: Sequence[Parameter]) -> str:
-    names = [parameter.name for parameter in group]
-    shown = ", ".join(names) if len(names) <= 10 else f"{names[0]} to {names[-1]}"
-    return f"{shown} [{_unit(group[0].unit)}]: {_prior(group[0])}"
+    return f"{_names(group)} [{_unit(group[0].unit)}]: {_prior(group[0])}"
+
+
+def _names(group: Sequence[Quantity]) -> str:
+    names = [quantity.name for quantity in group]
+    return ", ".join(names) if len(names) <= 10 else f"{names[0]} to {names[-1]}"
 
 
 def _unit(unit: str) -> str:
@@ -172,8 +176,12 @@ def _prior(parameter: Parameter) -> str:
 def _sizes(effect: Effect, model: Model) -> tuple[str, ...]:
     place = effect.label.partition(":")[2]
     where = f"{place} of {model.robot.name}" if place else model.robot.name
+    amplitudes: dict[str, list[Quantity]] = {}
+    for quantity in effect.amplitude_quantities:
+        amplitudes.setdefault(quantity.unit, []).append(quantity)
     return tuple(
-        f"for {where}: {f'{format_number(bound.largest)} {format_unit(bound.unit)}'.rstrip()}. {bound.reason}"
+        f"of {_names(amplitudes[bound.unit])} for {where}: "
+        f"{f'{format_number(bound.largest)} {format_unit(bound.unit)}'.rstrip()}. {bound.reason}"
         for bound in effect.physical_bounds(model)
     )
 
@@ -214,15 +222,25 @@ def _entries_of_noise() -> list[CatalogueEntry]:
     start = CatalogueEntry(
         name="initial-rate",
         summary="The base was already turning when the recording began; the model assumes that it starts from rest.",
-        parameters=("x, y, z [rad/s]: normal, mean 0, separate in every recording",),
-        sizes=(f"of any robot: {LARGEST:g} rad/s. A base that turns faster would not be taken for one at rest.",),
+        parameters=(
+            f"x, y, z [rad/s]: normal, mean 0, standard deviation initial_rate_sigma, by default {RATE_SIGMA:g}",
+            "with separate values in every recording",
+        ),
+        sizes=(f"of x, y, z for any robot: {LARGEST:g} rad/s. A base that turns faster is visibly not at rest.",),
         needs=('initial_rate = "zero" in [model]',),
     )
     faults = {fault.entry: fault for fault in noise_faults().values()}
+    kinds = [type(fault) for fault in faults.values()]
+    alike = sorted(faults.items(), key=lambda item: kinds.index(type(item[1])))  # faults of one kind together
     return [
         start,
         *(
-            CatalogueEntry(name, fault.summary, FAULT_OF_NOISE, (fault.parameters,), needs=(fault.needs,))
-            for name, fault in faults.items()
+            CatalogueEntry(name, fault.summary, FAULT_OF_NOISE, (fault.parameters,), needs=(_needs_of_noise(fault),))
+            for name, fault in alike
         ),
     ]
+
+
+def _needs_of_noise(fault: NoiseFault) -> str:
+    sensor = fault.entry.removesuffix("-noise")
+    return f"[sensors.{sensor}]" if sensor in {kind.value for kind in SensorKind.known()} else fault.needs

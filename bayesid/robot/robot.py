@@ -65,7 +65,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Load:
-    """A rigid body fixed on a link and not part of the URDF; its parameters are in the link's axes."""
+    """A rigid body fixed to a link and not part of the URDF; its parameters are in the link's axes."""
 
     name: str
     link: str
@@ -224,7 +224,7 @@ class Robot(ShortForm):
         return replace(self, links=MappingProxyType(links))
 
     def with_load(self, load: Load) -> Robot:
-        """Return the robot with a rigid body fixed on a link."""
+        """Return the robot with a rigid body fixed to a link."""
         if load.name in self.links:
             raise InputError(
                 f"the name {load.name!r} is already used by a link", file=self.file, remedy="Give the load another name"

@@ -30,7 +30,7 @@ __all__ = ["BaseMotion", "Beyond", "TorqueSensor", "beyond_joints", "joint_torqu
 
 @dataclass(frozen=True)
 class TorqueSensor:
-    """Sensors of the torques (forces of prismatic joints) that parents exert on children, at the motors' side.
+    """Sensors of the torques (forces of prismatic joints) that parent links exert on child links, at the motor side.
 
     Friction of a joint is part of the reading if the model has it as an effect (`JointFriction`).
 

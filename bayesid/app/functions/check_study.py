@@ -73,9 +73,11 @@ def check(
     Parameters
     ----------
     study : path, Study or Posterior
+        Path of a study file, the study that was read from it, or its posterior.
     executor : concurrent.futures.Executor, optional
         Executor whose workers read one recording each.
     progress : Progress, optional
+        Receiver of messages and of the share that is done.
 
     Raises
     ------

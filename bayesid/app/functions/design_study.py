@@ -30,6 +30,7 @@ class Designs(ShortForm):
     title : str
         Title of the study.
     seed : int
+        Seed of all random numbers.
     manoeuvres : tuple of Design
         The best manoeuvre by each criterion.
     best : Design
@@ -82,6 +83,7 @@ def design(
     Parameters
     ----------
     study : path, Study or Problem
+        Path of a study file, the study that was read from it, or a problem of design.
     seed : int
         Seed of all random numbers.
     starts : int

@@ -48,6 +48,7 @@ def diagnose(
     Parameters
     ----------
     study : path, Study or Model
+        Path of a study file, the study that was read from it, or its model.
     manoeuvres : sequence of Manoeuvre, optional
         Recorded manoeuvres of a model; a study names its recordings.
     seed : int
@@ -112,6 +113,7 @@ def followed_up(
     Parameters
     ----------
     result : Diagnosis
+        Result of `diagnose`.
     study : Study or None
         With the limits of the next manoeuvre, which is not designed where it is None.
     seed : int

@@ -37,6 +37,7 @@ def identify(
     Parameters
     ----------
     study : path, Study or Posterior
+        Path of a study file, the study that was read from it, or its posterior.
     seed : int
         Seed of all random numbers.
     effective_samples : float

@@ -39,6 +39,7 @@ class AssessedGoal(NamedTuple):
     value, wanted : float
         Value after the step, and the one wanted.
     unit : str
+        Unit of the quantity.
     reached : bool
     """
 
@@ -157,6 +158,7 @@ def loop(
     Parameters
     ----------
     study : path or Study
+        Path of a study file, or the study that was read from it.
     output : path
         Folder in which every step is stored; the loop resumes from its content.
     seed : int

@@ -70,6 +70,7 @@ def predict(
     Parameters
     ----------
     study : path, Study or Model
+        Path of a study file, the study that was read from it, or its model.
     manoeuvres : sequence of Manoeuvre, optional
         Planned manoeuvres of a model; a study names its recordings.
     seed : int

@@ -33,8 +33,10 @@ def recorded_posterior(
     Parameters
     ----------
     source : Study, path or Posterior
+        Path of a study file, the study that was read from it, or its posterior.
     window : int, optional
-        As for `Posterior.of`.
+        Number of earlier blocks on which the whitening conditions each sample, by default the smallest that is
+        accurate.
     progress : Progress, optional
         Receiver of the share of the recordings that is read.
     executor : concurrent.futures.Executor, optional

@@ -268,7 +268,7 @@ class Outliers(SensorFault):
     name = "outliers"
     summary = "Some samples deviate by far more than noise allows: lost or corrupted readings."
     advice = "They are single samples: inspect the readings themselves, and record at rest."
-    parameters = "fraction [1]: of the samples"
+    parameters = "fraction [1]: fraction of the samples that are outliers"
 
     LEVEL: ClassVar[float] = 1e-3  #: probability of more outliers by chance than a study with a fraction allows
     ROUNDS: ClassVar[int] = 3  #: fits after which what is left out stands, where a study states a fraction

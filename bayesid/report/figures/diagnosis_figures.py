@@ -67,6 +67,7 @@ def plot_verdict(result: Diagnosis, recording: int | None = None, *, axes: Any =
     Parameters
     ----------
     result : Diagnosis
+        Result of `diagnose`.
     recording : int, optional
         Number of the recording, by default that where the causes change most.
     axes : sequence of Axes, optional
@@ -150,6 +151,7 @@ def plot_disturbance(result: Diagnosis, frame: str | Frame = Frame.BASE, *, axes
     Parameters
     ----------
     result : Diagnosis
+        Result of `diagnose`.
     frame : str or Frame
         Axes: ``"base"``, ``"orbit"`` or ``"inertial"``.
     axes : array_like of Axes, optional

@@ -72,6 +72,7 @@ def plot_posterior(result: Identification | BodyDraws, name: str | None = None, 
     Parameters
     ----------
     result : Identification or BodyDraws
+        Result of `identify`, or draws of a body.
     name : str, optional
         Name of the link or load, by default the first that was identified.
     axes : (10, 10) array_like of Axes, optional

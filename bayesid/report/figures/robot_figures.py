@@ -172,6 +172,7 @@ def plot_robot(robot: Robot | str | Path, position: ArrayLike | None = None, *, 
     Parameters
     ----------
     robot : Robot or path of a URDF or MJCF
+        Robot, or its file.
     position : (joints,) array_like, optional
         Positions of the joints [rad or m], by default zero, or the nearest that the limits allow.
     ax : Axes3D, optional

@@ -139,7 +139,8 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     accurate above about 0.2 Hz. The ringing of the spring after jumps of the joint acceleration is omitted: with
     trapezoidal speed profiles a residual remains in addition to the joint's compliance. The deflection and the
     displacement of the links are computed with the bodies of the robot, and with the centres of the priors for unknown
-    ones: the displacement of a load far from its prior's centre is wrong.
+    ones: the displacement of a load far from its prior's centre is wrong. A diagnosis weighs two amplitudes: the
+    compliance 1 / omega^2 and the damping lag 2 damping / omega^3, with omega = 2 pi frequency.
     """
 
     name = "joint-flexibility"

@@ -130,7 +130,7 @@ class Effect:
 
     @classmethod
     def uses_latitude(cls, orbit: Orbit | None) -> bool:
-        """Return whether the argument of latitude matters: in an eccentric orbit it does for all that need an orbit."""
+        """Return whether the argument of latitude matters; in an eccentric orbit, to every effect that needs one."""
         return cls.needs_latitude or (cls.needs_orbit and orbit is not None and orbit.eccentricity > 0.0)
 
     @property
@@ -148,7 +148,7 @@ class Effect:
         return values
 
     def attach(self, robot: Robot) -> Self:
-        """Return the effect on a robot, and raise an `InputError` if the robot lacks its place."""
+        """Return the effect on a robot, and raise an `InputError` if the robot has no such link or joint."""
         return self
 
     def in_study(self, longest: float | None, records_wheels: bool) -> Self | None:
@@ -181,14 +181,14 @@ class Effect:
         return changed
 
     def in_recording(self, index: int) -> Self:
-        """Return the effect as its `table` and `jumps` are in the recording of an index, by default itself.
+        """Return the effect with the `table` and `jumps` of the recording with that index, by default itself.
 
         An effect whose constants differ between recordings, such as an instant, overrides this.
         """
         return self
 
     def jumps(self, end: float) -> Sequence[float]:
-        """Return the instants [s] at which `table` jumps in a recording of length ``end``, just after each of them."""
+        """Return the instants [s] just after each jump of `table` in a recording of length ``end``."""
         return ()
 
     @property

@@ -191,9 +191,9 @@ def _pressure_bounds(kind: type[_Pressure], model: Situation) -> tuple[PhysicalB
 class AerodynamicDrag(_Pressure):
     """Constant drag against the orbital motion, at a centre of pressure offset from the centre of mass.
 
-    The prior's median of 5 mN is the drag of ten square metres at 350 km; its spread of 1.5 in the logarithm stands for
-    density and area. The prior of the centre of pressure is uniform within two metres of the base origin along each
-    axis, whatever the size of the robot; the largest torque is that on this robot's area.
+    The prior's median of 5 mN is the drag of ten square metres at 350 km; the standard deviation of 1.5 of its
+    logarithm stands for density and area. The prior of the centre of pressure is uniform within two metres of the base
+    origin along each axis, whatever the size of the robot; the largest torque is that on this robot's area.
     """
 
     name = "aerodynamic-drag"
@@ -229,8 +229,8 @@ class AerodynamicDrag(_Pressure):
 class SolarPressure(_Pressure):
     """Constant radiation pressure from the Sun's direction, at a centre of pressure offset from the centre of mass.
 
-    The prior's median of 0.3 mN is that of 66 square metres of absorbing panel; its spread of 2 in the logarithm stands
-    for area and reflection.
+    The prior's median of 0.3 mN is that of 66 square metres of absorbing panel; the standard deviation of 2 of its
+    logarithm stands for area and reflection.
     """
 
     name = "solar-pressure"

@@ -195,9 +195,9 @@ class FlexibleAppendage(_Vibration):
 class FuelSlosh(_Vibration):
     """Fuel in a tank, as a mass on equal springs along three axes (Dodge 2000) that at rest is part of the base.
 
-    The prior's median is 10 kg with a spread of 1 in the logarithm. The tank lies within a box one and a half times as
-    large as the uniform box with the base's mass and inertia; in Python, ``FuelSlosh(reach=...)`` sets another half
-    width [m].
+    The prior's median is 10 kg, with a standard deviation of 1 of its logarithm. The tank lies within a box one and a
+    half times as large as the uniform box with the base's mass and inertia; in Python, ``FuelSlosh(reach=...)`` sets
+    another half width [m].
     """
 
     name = "fuel-slosh"

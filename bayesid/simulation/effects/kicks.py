@@ -28,8 +28,8 @@ class Kicks(Events):
     Each kick gives the robot a momentum and an angular momentum, which are constant in inertial space from then on.
     The rate of the base jumps at the instant of the kick, whatever the integration step.
 
-    The accelerometer has no sample during the push, so the motion of the base depends only on the angular momentum of a
-    kick about the common centre of mass, and that is what a diagnosis reports.
+    The accelerometer takes no sample during the push, so the motion of the base depends only on the angular momentum of
+    a kick about the common centre of mass, and that is what a diagnosis reports.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class Kicks(Events):
         "The base receives an external impulse at one or a few instants, such as a contact or the separation of a part."
     )
     separated_by = (
-        "The rates jump and do not recover, unlike the momentum exchanged with a wheel or a panel. Repeat the motion: "
-        "a contact recurs at the same posture, an external hit does not."
+        "The rates jump and do not return, unlike after an exchange of momentum with a wheel or a panel. Repeat the "
+        "motion: a contact recurs at the same posture, an external hit does not."
     )
     states = 3
     # with J and P the angular momentum about the base origin and the momentum of each kick, the angular momentum about

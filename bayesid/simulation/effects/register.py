@@ -30,7 +30,7 @@ def known_effects() -> dict[str, type[Effect]]:
 
 
 def create(label: str, **options: Any) -> Effect:
-    """Return the effect of a label as in study files, such as ``"gravity-gradient"``.
+    """Return the effect of a label as in study files, such as ``"gravity-gradient"``; options are those of its class.
 
     Raises
     ------

@@ -125,7 +125,7 @@ class WheelHistory(Placed):
     def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels of a robot of this mass and size, and the torque that runs them up."""
         full = wheel_bound(model.robot)
-        torque = f"{full.reason} The fastest motors take {RUN_UP:g} s to full speed."
+        torque = f"{full.reason} The fastest motors reach full speed in {RUN_UP:g} s."
         return full, PhysicalBound("N m", full.largest / RUN_UP, torque)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from bayesid.recording.recording import Recording
 from bayesid.report.figures.figure_style import AFTER, BEFORE, curve_style, styled, wide_figure
 from bayesid.report.numbers import format_number
+from studies.manual.pictures.pages import adopt
 from studies.manual.pictures.picture import Picture
 
 
@@ -77,9 +78,10 @@ def reading(folder: Path) -> str:
     )
 
 
-COMMANDS = (
+STEPS = (
     "bayesid demo --output out --samples 1000",
-    "bayesid identify adopted.toml --output after --samples 1000",
+    adopt,
+    "bayesid identify out/study/adopted.toml --output after --samples 1000",
     "bayesid design plan.toml --output design --starts 2 --iterations 20",
 )
-PICTURE = Picture("plan", COMMANDS, ("adopted.toml", "plan.toml"), draw, reading)
+PICTURE = Picture("plan", STEPS, ("plan.toml",), draw, reading)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from bayesid.report.figures.figure_style import AFTER, styled, wide_figure
 from bayesid.report.numbers import format_number
+from studies.manual.pictures.pages import adopt
 from studies.manual.pictures.picture import Picture
 
 SHOWN = 6  # number of candidates that are drawn
@@ -60,8 +61,9 @@ def reading(folder: Path) -> str:
     )
 
 
-COMMANDS = (
+STEPS = (
     "bayesid demo --output out --samples 1000",
-    "bayesid identifiability adopted.toml --output identifiability --samples 200 --profiles 1",
+    adopt,
+    "bayesid identifiability out/study/adopted.toml --output identifiability --samples 200 --profiles 1",
 )
-PICTURE = Picture("sensors", COMMANDS, ("adopted.toml",), draw, reading)
+PICTURE = Picture("sensors", STEPS, (), draw, reading)
