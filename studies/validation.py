@@ -121,7 +121,7 @@ def _goals(document: Document, goals: Sequence[Judged], verdict: Verdict) -> Non
         header.append("severity")
         caption += f" Severity: {severities()}."
         if any(goal.severity == UNSTATED for goal in goals):
-            caption += " Summaries written before 0.3.0 state none."
+            caption += " Some summaries of earlier versions state none."
         rows = [
             [*row, name]
             for name in (*(severity.value for severity in Severity), UNSTATED)
@@ -197,7 +197,10 @@ def _caution(summaries: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, str
     """Yield the caution on studies that were not run in full, if there are any."""
     short = [name for name, summary in summaries.items() if not summary["full"]]
     if short:
-        yield "Caution", f"Not run in full: {', '.join(short)}. Read their results as examples."
+        yield (
+            "Caution",
+            f"Not run in full: {', '.join(short)}. Read {'its' if len(short) == 1 else 'their'} results as examples.",
+        )
 
 
 def _where(goals: Sequence[Judged]) -> str:
@@ -206,7 +209,7 @@ def _where(goals: Sequence[Judged]) -> str:
         if goal.verdict is Verdict.FAIL:
             missed[goal.study] = missed.get(goal.study, 0) + 1
     return (
-        "missed by " + ", ".join(f"{name} ({number})" for name, number in missed.items()) if missed else "none missed"
+        "missed in " + ", ".join(f"{name} ({number})" for name, number in missed.items()) if missed else "none missed"
     )
 
 

@@ -183,7 +183,9 @@ with _reported(), complete_folder(Path({str(tmp_path / "out")!r})) as folder:
     write_json(folder / "large.json", {{"values": list(range(9999))}})
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
-    assert "Error: File too large. Free disk space there" in done.stderr.replace("\n", " "), done.stderr
+    assert "Error: File too large. Free space on the disk of the output folder" in done.stderr.replace("\n", " "), (
+        done.stderr
+    )
     assert not (tmp_path / "out").exists()
 
 

@@ -37,7 +37,7 @@ def test_misses_come_first_and_unknown_studies_are_not_lost(tmp_path):
     write_validation(tmp_path, tmp_path / "validation.pdf")
     text = PdfText.read(tmp_path / "validation.pdf")
     assert "1 of 4 goals are met, and 1 are missed." in text
-    assert "missed by novel (1)" in text
+    assert "missed in novel (1)" in text
     assert f"So. {NOT_FULL}" in text
     assert "older: reports without a summary" in text
     whole = " ".join(" ".join(text.pages).split())

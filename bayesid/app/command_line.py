@@ -40,7 +40,7 @@ __all__ = ["app", "main"]
 SUFFIX = "_command"  # ending of the names of those modules of this folder that are commands
 
 FULL, CLOSED = (
-    "Free disk space there and run the command again",
+    "Free space on the disk of the output folder and run the command again",
     "Choose another output folder, or grant write permission",
 )
 

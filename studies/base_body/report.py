@@ -34,13 +34,13 @@ def _report(result: BaseBody) -> Report[BaseBody]:
         subtitle="Problem 1 and section 4.1 of Lampariello and Hirzinger (IDETC 2005)",
         question="How well does one manoeuvre of the arm determine mass, centre of mass and inertia of the base, with "
         "realistic sensors, at the speed that the flight rule permits?",
-        answer="One manoeuvre at the permitted speed determines the base's mass to "
-        f"{format_percent(known[MASS], 2)} with an arm uncertain by 5 %. With the arm known exactly the standard "
-        f"deviation is {format_percent(permitted[MASS], 2)}, or {format_percent(faster[MASS], 2)} if the manoeuvre is "
-        f"flown {format_fixed(result.slowness, 1)} times faster. All values are 1 sigma, linearised. "
-        f"Data: one recording of {slow.duration:.0f} s at 2 Hz, with a star tracker of 2″ and an accelerometer of "
-        f"{format_number(GRADES[0])} m/s² per sample. With an uncertain arm no better sensor of motion helps, but "
-        f"{WAY_OUT}.",
+        answer=f"One manoeuvre at the permitted speed determines the base's mass to {format_percent(known[MASS], 2)} "
+        "with an arm uncertain by 5 %. With the arm known exactly the standard deviation is "
+        f"{format_percent(permitted[MASS], 2)}, or {format_percent(faster[MASS], 2)} if the manoeuvre is flown "
+        f"{format_fixed(result.slowness, 1)} times faster. All values are 1 sigma, linearised. Data: one recording of "
+        f"{slow.duration:.0f} s at 2 Hz ({motion.duration:.0f} s if flown faster), with a star tracker of 2″ and an "
+        f"accelerometer of {format_number(GRADES[0])} m/s² per sample. With an uncertain arm no better sensor of "
+        f"motion helps, but {WAY_OUT}.",
         valid="the posture, period and joint zeros, which the paper does not print, are as assumed here, noise is "
         "white and the arm's errors are independent from link to link. Posteriors were sampled for the faster "
         "manoeuvre only.",
@@ -57,14 +57,16 @@ def _report(result: BaseBody) -> Report[BaseBody]:
             f"moves at up to {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base turns at up to "
             f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s. The version flown "
             f"{format_fixed(result.slowness, 1)} times faster violates the rule; it turns the base at up to "
-            f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases "
-            "without noise and sampled posteriors use the faster version.",
+            f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10 "
+            "mrad/s. Cases without noise and sampled posteriors use the faster version.",
             sensors=f"At 2 Hz: star tracker attitude with 2″, an accelerometer of {format_number(GRADES[0])} m/s² "
             "with an unknown constant bias (prior 10⁻⁴ m/s²), and joint encoders of 10⁻⁶ rad where the posterior is "
-            "sampled.",
+            "sampled. Cases without noise compare rates and accelerations, and divide their residuals by 10⁻⁵ rad/s "
+            "and 10⁻⁵ m/s².",
             known="Orbit, and the arm: exactly, or with each link's mass uncertain by 5 % (1 sigma; relative width "
             "0.025).",
-            unknown="Ten parameters of the base, initial rate, bias, and the arm within its prior. Where the posterior "
+            unknown="Ten parameters of the base, initial rate and attitude and the bias (19 in all), and where it is "
+            "uncertain the arm within its prior (60 more). Where the posterior "
             "is sampled, the prior is centred on the paper's initial guess with a relative width of one.",
             replicates="One recording of each manoeuvre; coverage over many recordings is in the report on "
             "calibration.",
@@ -156,7 +158,7 @@ def _negatives(document: Document, result: BaseBody) -> None:
         "(faster manoeuvre). Measured joint torques, a known thrust or one known body also provide the scale (report "
         "on base parameters).",
         f"The poorly exciting manoeuvre, whose rate about z peaks at {format_fixed(1e3 * float(poor.peak[2]), 2)} "
-        f"mrad/s, loses nothing without noise; with noise I zz is {format_fixed(float(loss[6]), 1)} and I xy "
+        f"mrad/s, also reaches the goal without noise; with noise I zz is {format_fixed(float(loss[6]), 1)} and I xy "
         f"{format_fixed(float(loss[7]), 1)} times more uncertain.",
         "The printed optimum exceeds the joint limits of ±π/2 that the paper states: "
         + "; ".join(
@@ -224,8 +226,9 @@ def _statements(result: BaseBody) -> list[Statement]:
             f"Well exciting, the errors are up to {_worst(paper.RESULT_WELL)}; poorly exciting, up to "
             f"{_worst(paper.RESULT_POOR)} (4.1).",
             Finding.REFUTED,
-            f"These errors are no limit of the problem: without noise both are exact to {format_number(well, 1)} and "
-            f"{format_number(poor, 1)}. If the paper's data came from its model, its optimiser stopped early.",
+            "The problem does not cause these errors: without noise both manoeuvres are exact to "
+            f"{format_number(well, 1)} and {format_number(poor, 1)}. If the paper's data came from its model, its "
+            "optimiser stopped early.",
         ),
         Statement(
             "The excitation decides how well parameters are identified (3.2).",
@@ -253,12 +256,13 @@ def _assumptions(document: Document, _: BaseBody) -> None:
             f"The faster manoeuvre has a period of {PERIOD:g} s, two oscillations, and splines of {RAMP:g} s that "
             "match position, speed and acceleration of the oscillation. Without noise the period does not matter.",
             f"Joint zeros, axes and link frames are those of public models; joints 4 to 6 rest at ({wrist}) rad, where "
-            "the tip is farthest from joint 3. The paper's q may therefore be a different motion here.",
-            "The poorly exciting manoeuvre is q = (0.68, −0.03, 1.04, −0.53, 1.17, −0.37), from a search for the "
+            "the tip is farthest from joint 3. The angles of the paper may therefore be a different motion here.",
+            "The poorly exciting manoeuvre has the values (0.68, −0.03, 1.04, −0.53, 1.17, −0.37) rad of the design "
+            "variables of (26), two for each of joints 1 to 3, from a search for the "
             "smallest rate about z; the paper does not print its values.",
             "The base starts at rest; the paper's inertias are about the centre of mass; the accelerometer sits at "
-            "(0.4, 0.3, 0.8) m and its raw readings are compared. Links 2 to 6 have 1/25 of the base's mass, as in the "
-            "paper; for 1/7 they are scaled.",
+            "(0.4, 0.3, 0.8) m and its readings are used without integration. Links 2 to 6 have 1/25 of the base's "
+            "mass, as in the paper; for 1/7 they are scaled.",
         ]
     )
 

@@ -144,7 +144,7 @@ def error_figure(result: BaseBody) -> Figure:
     place = np.arange(len(LABELS))
     for index, (name, error) in enumerate(series.items()):
         marker = "os^vDPX*"[index % 8]
-        colour = BEFORE if name in PAPER else AFTER
+        colour = BEFORE if name in PAPER else COLOURS[index % len(COLOURS)]
         axes.plot(place + 0.06 * (index - 3.5), np.abs(error), marker, color=colour, label=name, markersize=4)
     axes.axhline(1e-6, color="black", linewidth=0.8, linestyle="--")
     axes.text(place[-1] + 0.4, 1.2e-6, "goal", ha="right", va="bottom")
@@ -185,5 +185,6 @@ def posterior_figure(result: BaseBody) -> Figure:
         axes.axhline(0.0, color=TRUTH, linewidth=0.8)
         axes.set_xticks(place, LABELS[pick])
     panels[0].set(ylabel="difference from the truth [%]", ylim=(-REACH, REACH))
+    panels[1].set(ylabel="difference from the truth [%]")
     panels[0].legend(ncols=2, loc="upper right")
     return figure

@@ -44,7 +44,8 @@ def share_text(count: int, total: int) -> str:
     if not total:
         return "none"
     low, high = (100.0 * end for end in Share(count, total).interval)
-    return f"{count} of {total} ({low:.1f} to {high:.1f} %)"
+    digits = 1 if count == total or high < 99.95 else 2  # an interval ends at 100 % only if nothing failed
+    return f"{count:,} of {total:,} ({low:.{digits}f} to {high:.{digits}f} %)"
 
 
 def wrongly_explained(trial: Trial) -> bool:
@@ -64,8 +65,8 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     halves = [t for t in inside if len(t.hidden) > 1 and len(t.causes) == 1 and t.holds]
     left = [t for t in outside if (t.signal_to_noise or 0.0) >= LEFT]
     limited = [t for t in clear if t.detection is not None and t.naming is not None]
-    amplitudes = np.array([e for t in trials if t.named_rightly for e in t.amplitude_errors])
-    bodies = np.array([e for t in trials if t.named_rightly or t.kind == "adequate" for e in t.body_errors])
+    amplitudes = [t.amplitude_errors for t in trials if t.named_rightly]
+    bodies = [t.body_errors for t in trials if t.named_rightly or t.kind == "adequate"]
     flown = in_basilisk(trials)
     return [
         _rate("Nothing hidden: false alarms", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
@@ -97,7 +98,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
 def _remainders(halves: Sequence[Trial]) -> Goal:
     """Return the goal on the remainder where one of two hidden causes is named; early trials did not state any."""
     stated = [trial for trial in halves if trial.remainder is not None]
-    text = "Inside, one of two hidden causes named: a remainder is stated, or undecided"
+    text = "Inside, only one of two hidden causes named: the verdict states a remainder or is undecided about it"
     goal = _least(text, 0.95, sum(trial.remainder != "none" for trial in stated), len(stated))
     if stated or not halves:
         return goal
@@ -120,7 +121,7 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
     The number of wrong verdicts of a decade is a sum of independent events with the stated probabilities of error. It
     scatters a little less than the Poisson variable of the same mean that it is compared with.
     """
-    text = f"Inside, named at {SURE:g} or more: false names no more frequent than stated in any decade"
+    text = f"Inside, named at {SURE:g} or more: false names no more frequent than stated in any range of probability"
     named = [(trial.probability, trial.holds) for trial in trials if (trial.probability or 0.0) >= SURE]
     if not named:
         return Goal(text, "none", Verdict.NOT_TESTED, Severity.HIGH)
@@ -128,10 +129,11 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
     for low, high in pairwise(DECADES):
         within = [(p, holds) for p, holds in named if p is not None and low <= p and (p < high or high == 1.0)]
         stated, wrong = sum(1.0 - p for p, _ in within), sum(not holds for _, holds in within)
-        parts.append(f"{low:g} to {high:g}: {wrong} of {len(within)}, {stated:.1f} stated")
+        parts.append(f"{low:g} to {high:g}: {wrong} of {len(within)}, {stated:.2g} expected")
         chances.append(float(stats.poisson.sf(wrong - 1, stated)))
     verdict = Verdict.FAIL if min(chances) < CHANCE / len(chances) else Verdict.PASS
-    return Goal(text, f"{'; '.join(parts)}; smallest p {min(chances):.2g}", verdict, Severity.HIGH)
+    least = f"smallest one-sided p {min(chances):.2g}, FAIL below {CHANCE / len(chances):.2g}"
+    return Goal(text, f"{'; '.join(parts)}; {least}", verdict, Severity.HIGH)
 
 
 def _worst_kind(trials: Sequence[Trial]) -> Goal:
@@ -188,15 +190,18 @@ def _relative(text: str, goal: float, trials: Sequence[Trial]) -> Goal:
     return Goal(text, f"{reached} of {len(trials)}", Verdict.between(low, high, least=goal), Severity.MEDIUM)
 
 
-def _scatter(text: str, errors: np.ndarray) -> Goal:
-    """Return the goal on errors in stated standard deviations: their root mean square, within two standard errors."""
+def _scatter(text: str, trials: Sequence[Sequence[float]]) -> Goal:
+    """Return the goal on the rms of errors in stated sd; errors of one trial are not taken as independent."""
     text = f"Errors of {text} in stated sd: rms {SCATTER[0]:g} to {SCATTER[1]:g}"
-    if len(errors) < 2:
+    squares = [np.square(errors) for errors in trials if len(errors)]
+    if len(squares) < 2:
         return Goal(text, NO_VALUE, Verdict.NOT_TESTED, Severity.HIGH)
-    rms = float(np.sqrt((errors**2).mean()))
-    error = float((errors**2).std() / (2.0 * rms * np.sqrt(len(errors))))
-    verdict = Verdict.between(rms - 2.0 * error, rms + 2.0 * error, *SCATTER)
-    return Goal(text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict, Severity.HIGH)
+    numbers = sum(map(len, squares))
+    rms = float(np.sqrt(sum(map(np.sum, squares)) / numbers))
+    deviations = [np.sum(square - rms**2) for square in squares]  # of the sum of each trial
+    error = float(np.linalg.norm(deviations) / (2.0 * rms * numbers))
+    reached = f"{rms:.3f} ± {error:.3f} ({numbers:,} numbers of {len(squares):,} trials)"
+    return Goal(text, reached, Verdict.between(rms - 2.0 * error, rms + 2.0 * error, *SCATTER), Severity.HIGH)
 
 
 def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence[Trial]) -> Goal:
@@ -223,7 +228,7 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     counts = np.array([len(errors) for errors in trials])
     share = float(covered.sum() / counts.sum())
     error = float(np.sqrt(((covered - share * counts) ** 2).sum()) / counts.sum())
-    reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum()} numbers of {len(counts)} trials)"
+    reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum():,} numbers of {len(counts):,} trials)"
     return Goal(text, reached, Verdict.between(share - 2.0 * error, share + 2.0 * error, least, most), Severity.HIGH)
 
 

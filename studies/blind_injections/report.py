@@ -15,10 +15,11 @@ from bayesid._io.files import write_json
 from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, TRUTH, styled, wide_figure
-from bayesid.report.numbers import format_number
+from bayesid.report.numbers import NO_VALUE, format_number, format_probability
 from studies.blind_injections import goals, rows
 from studies.blind_injections.goals import SURE, share_text, surely_misnamed
 from studies.blind_injections.limits import DRAWS
+from studies.blind_injections.rows import case_words
 from studies.blind_injections.trials import ALIKE, Trial, plan, read
 from studies.blind_injections.trials import run as make_trials
 from studies.common.code_version import CodeVersion
@@ -28,6 +29,7 @@ from studies.common.study import MADE, WORKERS, CsvTable, Picture, Report, Setup
 
 SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
 SHOWN = 2  # trials of a case that were not answered rightly, from which the report lists its answers
+SUREST = 0.99  # stated probability from which wrong verdicts are counted apart
 TICKS = (3, 5, 7, 10, 20, 50, 100)  # ticks of the signal-to-noise ratio in the figure
 
 
@@ -68,8 +70,8 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     whole = sum(trial.named_rightly for trial in sure)
     answer = (
-        f"{share_text(right, len(sure))} verdicts with a probability of {SURE:g} or more on a hidden cause of the "
-        f"catalogue name no false cause, and {whole} of these name all hidden causes. In "
+        f"In trials with a hidden cause of the catalogue, {share_text(right, len(sure))} verdicts stated at {SURE:g} "
+        f"or more name no false cause, and {whole} of these name all hidden causes. In "
         f"{share_text(sum(map(surely_misnamed, outside)), len(outside))} trials with an effect outside the catalogue a "
         f"cause of the catalogue was wrongly named with such a probability; {share_text(alarmed, len(nulls))} trials "
         "with nothing hidden raised an alarm."
@@ -87,19 +89,21 @@ def _report(campaign: Campaign) -> Report[Campaign]:
         "an alarm with nothing hidden?",
         answer=answer,
         goals=judged,
-        valid="a base carries an arm of three to five joints whose links are exact or have a relative uncertainty of "
-        "2 %, and noise is white and as declared unless a noise fault is hidden.",
+        valid="a base carries an arm of three to five joints whose links are known exactly or to 2 %, "
+        "and noise is white and as declared unless a noise fault is hidden.",
         full=len(trials) >= planned,
         figure=Picture(
             _figure([trial for trial in trials if trial.kind == "effect"]),
             "Outcomes of the trials with a hidden cause of the catalogue, by its signal-to-noise ratio. Faults that "
-            "only change the noise have no such ratio and are omitted.",
+            "only change the noise have no such ratio and are omitted. In the set, not alone: the hidden causes are "
+            "one of several reported explanations, or are named with another.",
         ),
-        note="Brackets contain exact 95 % intervals: Clopper and Pearson for shares, order statistics for medians. NOT "
-        "DECIDED: the interval has values on both sides of the goal, because too few trials were made. σ of a "
-        "cause: the root of the noncentrality of its signal without the part that the model's unknowns absorb. σ of an "
-        "effect outside the catalogue: the same for the part that the most probable set of known causes does not "
-        "absorb either; only this part could reveal that the named causes are wrong.",
+        note="Brackets contain exact 95 % intervals: Clopper and Pearson for shares, order statistics for medians; ± "
+        "is one standard error, and the verdict takes two on either side. NOT DECIDED: the interval has values on both "
+        "sides of the goal, because too few trials were made. σ of a cause: the root of the noncentrality of its "
+        "signal without the part that the model's unknowns absorb. σ of an effect outside the catalogue: the same for "
+        "the part that the most probable set of known causes does not absorb either; only this part could reveal that "
+        "the named causes are wrong.",
         setup=_setup(trials, planned),
         sections=[_failures, _evidence, _parting, _calibration, _answers],
         tables=_tables(trials),
@@ -114,8 +118,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     seeds = [trial.seed for trial in trials]
     wheels, fast = _made_in(trials, "wheel1", "wheels", "tachometers"), _made_in(trials, "1 kHz")
     return Setup(
-        robot="Three robots of three to five joints, one with prismatic joints and branches, in MuJoCo: bodies, "
-        "springs, fields and sensor faults, without any code of the package. In "
+        robot="Three robots of three to five joints, one with prismatic joints and branches, simulated in MuJoCo; "
+        "its bodies, springs, fields and sensor faults share no code with the package. In "
         f"{len(goals.in_basilisk(trials))} trials two of them fly in Basilisk, where a soft servo drives the joints; "
         "hidden are Basilisk's models of a wheel, leak, slosh or panel, or nothing."
         + (f" In {wheels} trials it is a satellite of wheels without an arm." if wheels else ""),
@@ -128,9 +132,9 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
         "relative uncertainty of 2 %.",
         unknown="The base's ten parameters, the initial rates, and the hidden cause. The diagnosis reads only the "
         "files.",
-        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]} with hidden causes of "
-        f"the catalogue, {counts[1]} with a cause outside it, {counts[2]} with nothing hidden. Seeds {min(seeds)} to "
-        f"{max(seeds)}, different from those of the tests.",
+        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]:,} with hidden causes "
+        f"of the catalogue, {counts[1]} with a cause outside it, {counts[2]} with nothing hidden. Seeds {min(seeds)} "
+        f"to {max(seeds)}, different from those of the tests.",
     )
 
 
@@ -139,23 +143,18 @@ def _made_in(trials: Sequence[Trial], *ends: str) -> int:
     return sum(trial.case.endswith(ends) for trial in trials)
 
 
-def _failure(alike: Sequence[Trial]) -> str:
+def _failure(alike: Sequence[Trial]) -> list[str]:
+    """Return the row of trials that have the same case and the same answer."""
     first = alike[0]
-    said = _said(first)
-    each = []
-    for trial in alike:
-        parts = [f"seed {trial.seed}"]
-        if trial.probability is not None:
-            parts.append(f"stated {trial.probability:.3f}")
-        if trial.signal_to_noise is not None:
-            parts.append(f"{trial.signal_to_noise:.1f} σ")
-        each.append(", ".join(parts))
-    if first.kind == "adequate":
-        return (
-            f"Nothing was hidden ({first.case.removeprefix('null, ')}), but the verdict was {said}: {'; '.join(each)}."
-        )
-    where = ", outside the catalogue," if first.kind == "unknown" else ""
-    return f"{first.case.replace(', ', ' + ')}{where} was reported as {said}: {'; '.join(each)}."
+    stated = [trial.probability for trial in alike if trial.probability is not None]
+    ratios = [trial.signal_to_noise for trial in alike if trial.signal_to_noise is not None]
+    return [
+        _hidden(first),
+        _said(first),
+        str(len(alike)),
+        format_probability(max(stated)) if stated else NO_VALUE,
+        f"{max(ratios):.1f}" if ratios else NO_VALUE,
+    ]
 
 
 def _failures(document: Document, campaign: Campaign) -> None:
@@ -165,8 +164,19 @@ def _failures(document: Document, campaign: Campaign) -> None:
     alike: dict[tuple[str, str], list[Trial]] = {}
     for trial in wrong:
         alike.setdefault((trial.case, _said(trial)), []).append(trial)
-    texts = [_failure(group) for group in alike.values()]
-    if not wrong:
+    texts = []
+    if wrong:
+        order = ("effect", "unknown", "adequate")
+        groups = sorted(alike.values(), key=lambda group: (order.index(group[0].kind), group[0].case, -len(group)))
+        add_number_table(
+            document,
+            ["hidden", "reported", "trials", "largest probability", "largest σ"],
+            [_failure(group) for group in groups],
+            "All trials in which something was wrongly named, or an alarm was raised with nothing hidden, by what was "
+            "hidden and what was reported; the seeds are in the table of trials.",
+            words=2,
+        )
+    else:
         texts.append("No trial was misnamed, and no trial with nothing hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]
     if missed:
@@ -180,15 +190,18 @@ def _failures(document: Document, campaign: Campaign) -> None:
         wrongly = sum(t.frame not in (None, t.true_frame) for t in framed)
         median = np.median([trial.correlation or 0.0 for trial in framed])
         texts.append(
-            f"Axes in which an outside torque is fixed: {share_text(right, len(framed))} named correctly, {wrongly} "
-            f"wrongly. Over all {len(framed)} outside torques that were reported as unknown, the correlation of the "
-            f"reconstructed with the true one has a median of {median:.2f} and is "
+            "Axes (base, orbit or inertial) in which a torque from outside the catalogue is constant: "
+            f"{share_text(right, len(framed))} determined correctly, {wrongly} wrongly, "
+            f"{len(framed) - right - wrongly} not determined. Over all {len(framed)} such torques that were reported "
+            f"as unknown, the correlation of the reconstructed with the true one has a median of {median:.2f} and is "
             f"{min(trial.correlation or 0.0 for trial in framed):.2f} in the worst case."
         )
     document.items(texts)
 
 
 def _hidden(trial: Trial) -> str:
+    if trial.kind == "adequate":
+        return case_words(trial.case)
     outside = " (outside the catalogue)" if trial.kind == "unknown" else ""
     return trial.case.replace(", ", " + ") + outside
 
@@ -203,16 +216,17 @@ def _evidence(document: Document, campaign: Campaign) -> None:
         document,
         [
             *("signal-to-noise", "trials", "alarm", "alarm, limit", "in the set"),
-            *("named alone", "named alone, limit", "misnamed"),
+            *("named alone", "named alone, limit", "false cause", "in part"),
         ],
         rows.rates(campaign.trials),
         "Trials with a hidden cause of the catalogue, by its signal-to-noise ratio: the root of its noncentrality "
         "without the part that the model's unknowns absorb. The limits are the numbers expected from a test that knows "
         "which effect to look for (family-wise 1 %), and from the Bayes decision between all sets of causes on data of "
         f"the linear model, simulated {'once' if DRAWS == 1 else f'{DRAWS} times'} per trial. In the set: the hidden "
-        "causes are among the reported explanations. Misnamed: causes are named, and the hidden ones are in no "
-        "explanation. Names that describe the same change of the model, such as a payload and the inertia of its link, "
-        "or the latencies of different sensors, count as the same cause.",
+        "causes are among the reported explanations, alone or not. False cause: something that is not hidden is named. "
+        "In part: only hidden causes are named, but not all of them, and no reported explanation has all. Names that "
+        "describe the same change of the model, such as a payload and the inertia of its link, or the latencies of "
+        "different sensors, count as the same cause.",
     )
 
 
@@ -243,7 +257,7 @@ def _calibration(document: Document, campaign: Campaign) -> None:
             stated,
             "Trials whose verdict names causes, by the probability stated for the named causes together. Correct: "
             "every named cause is hidden. Intervals are Wilson's. Frequency and size of the hidden causes follow the "
-            "plan and not the prior of the diagnosis, so stated and observed shares need not agree exactly.",
+            f"plan and not the prior of the diagnosis. {_overconfident(trials)}".strip(),
         )
         document.figure(
             rows.reliability_figure(trials),
@@ -269,7 +283,10 @@ def _answers(document: Document, campaign: Campaign) -> None:
         SCORES,
         [[row[0], *(cell.replace("-", "−") for cell in row[1:])] for row in rows.scores(trials)],
         "Scores of the stated probabilities with standard errors, over the trials: for each cause stated above 1 %, "
-        "for a cause outside the catalogue, and for nothing.",
+        "for a cause outside the catalogue, and for nothing. The log score is the mean natural logarithm of the "
+        "probability given to what was true: 0 is perfect, and always stating one half gives −0.693. Every name of a "
+        "class of equivalent causes counts as a statement with the probability of the class, also a name that is not "
+        "what is hidden.",
     )
     amiss = Counter(trial.case for trial in trials if not _answered(trial))
     mixed = {case for case, count in amiss.items() if count >= SHOWN}
@@ -280,13 +297,26 @@ def _answers(document: Document, campaign: Campaign) -> None:
             document,
             ["hidden", "answers, with the number of trials"],
             sorted(rows.confusion([trial for trial in trials if trial.case in mixed])),
-            f"Answers for the {len(mixed)} kinds of hidden cause with {SHOWN} or more trials that were not answered "
-            f"exactly: all their trials, of any strength. Those for the {others} other cases are in "
-            "blind_injections-answers.csv.",
+            f"Answers for the {len(mixed)} cases with {SHOWN} or more trials that were not answered "
+            f"exactly: all their trials, of any strength. Adequate: no alarm; unknown: a cause outside the catalogue; "
+            "unresolved: no four explanations together reach 95 %; or N more: so many further explanations remain "
+            f"possible. Those for the {others} other cases are in blind_injections-answers.csv.",
             words=2,
         )
     else:
         document.paragraph(f"In each of the {others} cases at most {SHOWN - 1} trial was not answered correctly.")
+
+
+def _overconfident(trials: Sequence[Trial]) -> str:
+    """Return how many of the wrong verdicts of the highest probabilities are on effects from outside the catalogue."""
+    wrong = [t for t in trials if t.probability is not None and t.probability >= SUREST and not t.holds]
+    outside = sum(trial.kind == "unknown" for trial in wrong)
+    if not wrong:
+        return ""
+    return (
+        f"Of the {len(wrong)} wrong verdicts stated at {SUREST:g} or more, {outside} are on effects outside the "
+        "catalogue, for which the stated probabilities allow too little."
+    )
 
 
 def _answered(trial: Trial) -> bool:
@@ -321,7 +351,7 @@ def _cell(value: object) -> object:
 # outcomes of a trial from the top of the figure down, each with its colour
 OUTCOMES = {
     "named alone": AFTER,
-    "in the set": "#56B4E9",
+    "in the set, not alone": "#56B4E9",
     "alarm, nothing named": TRUTH,
     "no alarm": "#000000",
     "misnamed": BEFORE,
@@ -330,7 +360,7 @@ OUTCOMES = {
 
 @styled
 def _figure(injected: Sequence[Trial]) -> Figure:
-    figure = wide_figure(1.9)
+    figure = wide_figure(1.7)
     axes = figure.subplots()
     for row, (label, colour) in enumerate(reversed(OUTCOMES.items())):
         ratios = [t.signal_to_noise for t in injected if t.signal_to_noise is not None and _outcome(t) == label]
@@ -350,7 +380,7 @@ def _outcome(trial: Trial) -> str:
     if trial.named_rightly:
         return "named alone"
     if trial.in_set:
-        return "in the set"
+        return "in the set, not alone"
     return "alarm, nothing named" if trial.alarmed else "no alarm"
 
 

@@ -33,12 +33,15 @@ def rates(trials: Sequence[Trial]) -> list[list[str]]:
 
 
 def _row(trials: Sequence[Trial]) -> list[str]:
-    keys = ("alarmed", "in_set", "named_rightly", "misnamed")
-    alarmed, in_set, named, misnamed = (str(sum(getattr(trial, key) for trial in trials)) for key in keys)
+    alarmed, in_set, named = (
+        str(sum(getattr(trial, key) for trial in trials)) for key in ("alarmed", "in_set", "named_rightly")
+    )
+    partly = sum(trial.misnamed and trial.holds for trial in trials)
+    falsely = sum(trial.misnamed for trial in trials) - partly
     limits = [(t.detection, t.detection * t.naming) for t in trials if t.detection is not None and t.naming is not None]
     sums = (f"{sum(column):.1f}" for column in zip(*limits, strict=True))
     detection, naming = sums if limits else (NO_VALUE, NO_VALUE)
-    return [str(len(trials)), alarmed, detection, in_set, named, naming, misnamed]
+    return [str(len(trials)), alarmed, detection, in_set, named, naming, str(falsely), str(partly)]
 
 
 def parting(trials: Iterable[Trial]) -> list[list[str]]:
@@ -104,7 +107,7 @@ def scores(trials: Iterable[Trial]) -> list[list[str]]:
             error = np.sqrt(len(p))
             brier_text = f"{brier.mean():.4f} ± {brier.std() / error:.4f}"
             log_text = f"{logs.mean():.3f} ± {logs.std() / error:.3f}"
-            rows.append([name, str(len(p)), brier_text, log_text, f"{p.mean():.3f}", f"{true.mean():.3f}"])
+            rows.append([name, f"{len(p):,}", brier_text, log_text, f"{p.mean():.3f}", f"{true.mean():.3f}"])
     return rows
 
 
@@ -119,9 +122,18 @@ def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
 def confusion(trials: Iterable[Trial]) -> list[list[str]]:
     """Return each hidden case with its answers and their numbers, all strengths and seeds together."""
     return [
-        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common())]
+        [
+            case_words(case),
+            ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common()),
+        ]
         for case, answers in _answers(trials).items()
     ]
+
+
+def case_words(case: str) -> str:
+    """Return the name of a case, in words where nothing is hidden."""
+    name, comma, kind = case.partition(", ")
+    return f"nothing hidden{comma}{kind}" if name == "null" else case
 
 
 def confusion_matrix(trials: Iterable[Trial]) -> tuple[list[str], list[list[str]]]:
@@ -148,7 +160,7 @@ def errors(trials: Sequence[Trial]) -> list[list[str]]:
     quiet = [trial for trial in trials if trial.kind == "adequate"]
     return [
         _scattered("amplitudes of correctly named causes", [error for t in right for error in t.amplitude_errors]),
-        _scattered("base, after the extension", [error for t in right for error in t.body_errors]),
+        _scattered("base, with the named causes", [error for t in right for error in t.body_errors]),
         _scattered("base, nothing hidden", [error for t in quiet for error in t.body_errors]),
     ]
 
@@ -158,7 +170,7 @@ def _scattered(label: str, values: Sequence[float]) -> list[str]:
     if len(errors) == 0:
         return [label, "0", *[NO_VALUE] * 4]
     inside = [f"{100.0 * (np.abs(errors) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
-    return [label, str(len(errors)), format_signed(errors.mean(), 2), f"{np.sqrt((errors**2).mean()):.2f}", *inside]
+    return [label, f"{len(errors):,}", format_signed(errors.mean(), 2), f"{np.sqrt((errors**2).mean()):.2f}", *inside]
 
 
 @styled

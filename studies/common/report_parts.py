@@ -21,7 +21,7 @@ TERMS = {
     "importance sampling": "weighted draws from the Laplace approximation",
     "Laplace": "the normal distribution at the posterior's mode",
     "ln B": "logarithm of the ratio of two models' evidences",
-    "NUTS": "Hamiltonian Monte Carlo without U-turns",
+    "NUTS": "the No-U-Turn Sampler, Hamiltonian Monte Carlo that ends a path before it turns back",
     "ranks": "positions of the truth among the posterior draws",
     "sd": "standard deviation",
     "rms": "root mean square",

@@ -174,7 +174,7 @@ MISTAKES: dict[str, Blunder] = {
     "attitudes with the scalar first": Blunder(
         edited(_quaternions(lambda q: q[[3, 0, 1, 2]])), ("convention:order:attitude",)
     ),
-    "attitudes inverse": Blunder(
+    "attitudes inverted": Blunder(
         edited(_quaternions(lambda q: q * np.array([-1.0, -1.0, -1.0, 1.0])[:, None])),
         ("convention:conjugate:attitude",),
     ),
@@ -189,7 +189,7 @@ MISTAKES: dict[str, Blunder] = {
     "rates with fill values": Blunder(edited(_filled("rate", 999.0)), ("convention:fill:rate",)),
     "rates three samples late": Blunder(edited(_late("rate.", 3)), ("convention:shift:rate",)),
     "accelerations two samples late": Blunder(edited(_late("accel.", 2)), ("convention:shift:accel",)),
-    "joints two samples early, as commanded": Blunder(
+    "joint commands instead of readings, two samples early": Blunder(
         edited(_late("position.", -2)),
         ("convention:shift:position",),
         0.05,  # they are taken to rest before

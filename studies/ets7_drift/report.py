@@ -61,7 +61,7 @@ def _report(cases: Cases) -> Report[Cases]:
             f"Base uncertain by {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 "
             "with its remedy, Euler angles of the base since the start; the bump between 60 and 145 s is the motion of "
             "the arm. Below: error of the predicted attitude, with the predicted 95 % band, which includes the "
-            "uncertainty after the rates and the attitude's noise.",
+            "posterior uncertainty given the rates, and the noise of the measured attitude.",
         ),
         setup=Setup(
             robot=f"ETS-VII as supplied with this package, on a circular orbit of {RADIUS / 1e3:g} km radius, without "
@@ -70,7 +70,7 @@ def _report(cases: Cases) -> Report[Cases]:
             f"its linear ramps are replaced by quintic ones. The tip moves at up to {1e3 * fastest:.0f} mm/s; the "
             f"flight rule is {1e3 * TIP_SPEED:.0f} mm/s.",
             sensors=f"Every {analysis.INTERVAL:g} s, noise per sample: rates {format_number(analysis.RATE_SIGMA)} "
-            "rad/s (the number of radians in the 2 arcsec of the paper's star tracker), joints "
+            "rad/s (numerically 2 arcsec in radians, as the paper's star tracker), joints "
             f"{format_number(analysis.ENCODER_SIGMA)} rad. The attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, "
             "is used for comparison only, except for the exact one at the start.",
             known="Orbit, links and joint motion. The present simulation starts at rest and includes no effect.",
@@ -78,8 +78,8 @@ def _report(cases: Cases) -> Report[Cases]:
             f"draw from this prior. Hidden: gravity gradient, wheel momentum {format_vector(analysis.MOMENTUM)} N m s, "
             f"and initial rates of {format_number(analysis.RATE)} rad/s per axis (assumed, as no values are public).",
             replicates=f"{len(shown.world.manoeuvres)} recordings of {analysis.DURATION:g} s with random attitudes and "
-            "positions in orbit, one base. This is a single scenario: rates of right verdicts are in the report on "
-            "blind injections.",
+            "positions in orbit, one base. This is a single scenario: how often verdicts are correct is in the "
+            "report on blind injections.",
         ),
         picture=Picture(
             figures.robot_pose(ets7(), analysis.MOTION, rests),
@@ -104,7 +104,7 @@ def _shown(cases: Cases) -> tuple[str, Case]:
 def _answer(cases: Cases) -> str:
     """Return what is said and predicted with each uncertainty of the base."""
     if all(case.right for case in cases.values()):
-        said = ["The diagnosis names exactly the three true causes of the drift."]
+        said = ["In simulated recordings the diagnosis names exactly the three causes of the drift."]
     else:
         said = [
             f"The diagnosis names {_named(case)} with a base uncertain by {known}." for known, case in cases.items()
@@ -114,7 +114,9 @@ def _answer(cases: Cases) -> str:
         before, after = (format_number(_rms(case, name), 2) for name in ("plain", "extended"))
         change = f"falls from {before} to {after}" if case.diagnosis.verdict.causes else f"stays at {before}"
         parts.append(f"{change} degrees with a base uncertain by {known} (1 sigma)")
-    return " ".join([*said, f"{ANGLE[:1].upper()}{ANGLE[1:]} {joined(parts)}."])
+    noise = format_number(float(np.degrees(analysis.ATTITUDE_SIGMA * np.sqrt(3.0))), 2)
+    limit = f"the noise of the measured attitude alone is {noise} degrees"
+    return " ".join([*said, f"{ANGLE[:1].upper()}{ANGLE[1:]} {joined(parts)}; {limit}."])
 
 
 def _named(case: Case) -> str:
@@ -206,11 +208,11 @@ def _failures(known: str, case: Case) -> list[str]:
     texts = [
         f"Base uncertain by {known}: changing the base does not fix the present simulation. "
         + (
-            "Every fit diverges, so the base stays at its prior"
+            "Every fit of the base diverges, so it stays at its prior; only the joint speeds at time 0 are fitted"
             if case.diagnosis.bodies_fixed
             else f"Fitted to the rates, the base's mass has an error of {format_signed(float(off), 0)} %"
         )
-        + f". Simulated with {'that' if case.diagnosis.bodies_fixed else 'the fitted'} base, {ANGLE} is "
+        + f". Simulated with {'these' if case.diagnosis.bodies_fixed else 'the fitted base'}, {ANGLE} is "
         f"{format_number(_rms(case, 'fitted'), 2)} degrees."
     ]
     missed = [cause for cause in analysis.CAUSES if cause not in verdict.causes]
@@ -240,8 +242,10 @@ def _evidence(document: Document, cases: Cases) -> None:
     document.table(
         ["base uncertain by", "causes", "probability", "log evidence", "chi-square per sample"],
         [[known, *_step_row(step)] for known, case in cases.items() for step in case.steps],
-        "The most probable sets of zero to three causes (of the named ones, where causes are named), each fitted. The "
-        "probability is that of exactly this set; the log evidence is relative to no cause.",
+        "For each number of causes the most probable set (of the named causes, where any are named). The probability "
+        "is that of exactly this set; all other sets share the rest. The log evidence, relative to no cause, is that "
+        "of models linearised about the best fit, whereas chi-square is that of a complete fit: far from the best fit "
+        "the two are not comparable.",
         columns("llrrr"),
     )
     quantities = [(known, quantity) for known, case in cases.items() for quantity in _quantities(case)]
@@ -279,8 +283,8 @@ def _quantities(case: Case) -> list[analysis.Amplitude]:
 def _fit_sentence(case: Case) -> str:
     before, extended = case.diagnosis.gain.before, case.diagnosis.gain.after
     return (
-        f"the chi-square per sample is {format_number(before.chi2_per_sample)} before and "
-        f"{format_number(extended.chi2_per_sample)} after the extension. {_held_out(case)}"
+        f"the chi-square per sample is {format_number(before.chi2_per_sample)} without the named causes and "
+        f"{format_number(extended.chi2_per_sample)} with them. {_held_out(case)}"
     ).strip()
 
 
@@ -290,7 +294,10 @@ def _held_out(case: Case) -> str:
     if before is None or after is None:
         return ""
     scores = [format_number(float(score.sum()), 4) for score in (before, after)]
-    return f"The log score of left-out recordings is {scores[0]} before and {scores[1]} after."
+    return (
+        "The log predictive density (natural logarithm) of recordings that are left out of the fit is "
+        f"{scores[0]} without and {scores[1]} with them."
+    )
 
 
 def _step_row(step: analysis.Step) -> list[str]:

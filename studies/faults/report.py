@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+import textwrap
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -114,6 +115,7 @@ CHANGES = dict(
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
 
 Made = Mapping[str, Any]  # a task with its result
+LONGEST = 300  # characters of a quoted message
 STATED = re.compile(r"\[[\w.]+\] (unit|time_unit) = ")  # lines of a study in a message that put a unit right
 
 
@@ -318,7 +320,7 @@ def _refused(around: Mapping[str, Made]) -> Goal:
 
 def _unmoved(task: Made | None) -> Goal:
     """Return the goal on a cache that another version filled."""
-    text = "cache of another version: no effect"
+    text = "A cache written by another version is not used"
     if task is None:
         reached = "not run; for a damaged cache file see tests/test_kept_jit.py"
         return Goal(text, reached, Verdict.NOT_TESTED, Severity.HIGH)
@@ -326,7 +328,7 @@ def _unmoved(task: Made | None) -> Goal:
         reached = "not decisive: the other version gives the same result"
         return Goal(text, reached, Verdict.NOT_TESTED, Severity.HIGH)
     same = "the same result as" if task["same"] else "a result that differs from that"
-    reached = f"{same} with an empty cache; the other version gives another result"
+    reached = f"{same} with an empty cache; the other version itself gives a different one, so the test can fail"
     return Goal(text, reached, Verdict.of(task["same"]), Severity.HIGH)
 
 
@@ -338,8 +340,9 @@ def _at_most(count: int, total: int) -> str:
 
 
 def _short(said: str) -> str:
-    """Return the beginning of a message, without the folders of files."""
-    return re.sub(r"/\S*/", "", said)[:300]
+    """Return a message, shortened, without the folders of files and what a command states before and after it."""
+    message = re.sub(r"^.*? unknowns\. | Write this into the study.*$", "", re.sub(r"/\S*/", "", said))
+    return textwrap.shorten(message, LONGEST, placeholder=" …")
 
 
 @styled

@@ -85,7 +85,7 @@ def _report(made: Made) -> Report[Made]:
             time_figure(made),
             f"Processor time to {EFFECTIVE:,.0f} effective samples against the number of unknowns. Filled: reached; "
             "hollow: extrapolated from the samples reached within the time limit; triangle: lower bound, because less "
-            "than a quarter was reached. Points of one number of unknowns are drawn next to each other.",
+            "than a quarter was reached. Points with the same number of unknowns are offset sideways.",
         ),
         setup=_setup(),
         outline=robot_outline(ets7(), START),
@@ -133,12 +133,21 @@ def _density(document: Document, made: Made) -> None:
     document.section("On the same density")
     add_number_table(
         document,
-        ["unknowns, sampler", "time [s]", "evaluations", "effective", f"time to {EFFECTIVE:,.0f}", "ratio", "evidence"],
+        [
+            "unknowns, sampler",
+            "time [s]",
+            "evaluations",
+            "effective",
+            f"time to {EFFECTIVE:,.0f} [s]",
+            "ratio",
+            "log evidence",
+        ],
         [row for unknowns in sorted(CASES) for row in _rows(made, unknowns)],
         f"Processor time and evaluations until the sampler stopped, effective samples, time to {EFFECTIVE:,.0f} of "
         "them (extrapolated where a quarter or more was reached, else a bound) and its ratio to the package's total "
         "time, and the error of the log evidence relative to bridge sampling, with the standard error stated by the "
-        "sampler. A dash: no value. The package's time includes the evidence.",
+        "sampler; that of the reference is not included here, but in the goals. A dash: no value. The package's time "
+        "is that of its whole run, which yields more samples, and the evidence.",
     )
 
 
@@ -210,7 +219,7 @@ def _fastest(package: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, An
 def _task_goals(made: Made) -> list[Goal]:
     goals = []
     for hidden, words in ((False, "nothing hidden"), (True, "hidden wheel momentum")):
-        text = f"stated 95 % intervals contain the truth, {words}"
+        text = f"stated 95 % intervals contain the truth in 95 % of cases, {words}"
         errors = _errors(made, Recipe.BAYESID, hidden)
         if not len(errors):
             goals.append(Goal(text, "not run", Verdict.NOT_TESTED, Severity.HIGH))
@@ -230,7 +239,7 @@ def _answer(made: Made) -> str:
     for unknowns in sorted(CASES):
         package, peers = _result_of(made, unknowns, Sampler.OURS), _peers(made, unknowns)
         if package is not None and peers:
-            ratios[unknowns] = _fastest(package, peers).partition(" (")[0]
+            ratios[unknowns] = min(_needed(peer) / package["seconds"] for peer in peers.values())
             bounds += [_needed(peer) / package["seconds"] for peer in peers.values() if _is_bound(peer)]
     if ratios:
         beside = (
@@ -240,13 +249,18 @@ def _answer(made: Made) -> str:
             else ""
         )
         parts.append(
-            f"The fastest alternative takes {joined(list(ratios.values()))} times as long as the package with "
+            f"The fastest alternative takes {'at least ' if bounds else ''}"
+            f"{joined([f'{ratio:.1f}' for ratio in ratios.values()])} times as long as the package with "
             f"{joined(list(map(str, ratios)))} unknowns.{beside}"
         )
     errors = [_evidence_error(made, unknowns, Sampler.OURS) for unknowns in CASES]
-    known = [abs(error[0]) for error in errors if error is not None]
+    known = [error for error in errors if error is not None]
     if known:
-        parts.append(f"The package's log evidence is within {max(known):.3f} of a long reference.")
+        largest, error = max(abs(size) for size, _, _ in known), max(sd for _, sd, _ in known)
+        parts.append(
+            f"The package's log evidence differs from a long reference by at most {largest:.3f}, with a standard "
+            f"error of at most {error:.3f}."
+        )
     errors_of_package, rivals = _errors(made, Recipe.BAYESID, True), _rivals(made, True)
     if len(errors_of_package) and rivals:
         others = " and ".join(f"{_inside(peer)} for {name}" for name, peer in rivals.items())
@@ -258,7 +272,7 @@ def _answer(made: Made) -> str:
     if ratios_of_task:
         parts.append(
             f"On the same task the package, which diagnoses and identifies, takes {format_range(ratios_of_task, 2)} "
-            f"times as long as a point estimate with {joined(_rivals(made, False))}."
+            f"times as long as a point estimate with {' or with '.join(_rivals(made, False))}."
         )
     return " ".join(parts) or "Nothing was run."
 
@@ -293,15 +307,15 @@ def _setup() -> Setup:
         unknown="Density: "
         + ", ".join(f"{size} ({CASES[size].title})" for size in sorted(CASES))
         + "; link masses are uncertain by 5 % (1 sigma). Task: base and initial rates.",
-        replicates=f"Each sampler runs alone in a process with one core, up to {EFFECTIVE:,.0f} effective samples or "
-        f"{min(LIMITS.values()):g} to {max(LIMITS.values()):g} s of processor time, more than five times the package's "
-        f"time; code is compiled beforehand. NUTS: {CHAINS} chains in batches with the unit mass matrix, {ADAPTATION} "
-        f"steps to adapt the step size. Nested samplers start from a normal prior of {BROAD:g} standard deviations "
-        f"about the mode, for which the evidence is that of the posterior; dynesty takes single points, {LIVE} live; "
-        f"both are run up to {NESTED} unknowns. The reference for means and evidence: chains of the package's sampler "
-        f"with {LONG:,.0f} effective samples, and bridge sampling (Meng and Wong 1996) between one half of them and a "
-        "Student-t fitted to the other; the chains are not independent of the package. FIGAROH needs measured joint "
-        "torques and is therefore not applicable.",
+        replicates=f"Each sampler runs alone in a process with one core, until at least {EFFECTIVE:,.0f} effective "
+        f"samples or {min(LIMITS.values()):g} to {max(LIMITS.values()):g} s of processor time, more than five times "
+        f"the package's time; code is compiled beforehand. NUTS: {CHAINS} chains in batches with the unit mass matrix, "
+        f"{ADAPTATION} steps to adapt the step size. Nested samplers start from a normal prior of {BROAD:g} standard "
+        "deviations about the mode, for which the evidence is that of the posterior; dynesty takes single points, "
+        f"{LIVE} live; both are run up to {NESTED} unknowns. The reference for means and evidence: chains of the "
+        f"package's sampler with {LONG:,.0f} effective samples, and bridge sampling (Meng and Wong 1996) between one "
+        "half of them and a Student-t fitted to the other; the chains are not independent of the package. FIGAROH "
+        "needs measured joint torques and is therefore not applicable.",
     )
 
 
@@ -338,7 +352,7 @@ def _failures(document: Document, made: Made) -> None:
     sentences.append(
         "The rollout of mujoco.sysid drives joints by forces and does not accept their motion. Its recipe therefore "
         "contains a separate simulation, and takes parameters, optimiser and intervals from the toolbox. MuJoCo 4.0.0 "
-        "compiles the tensor that the toolbox writes into a model only with one additional line."
+        "accepts the inertia tensor that the toolbox writes only after one more line of user code."
     )
     document.items(sentences)
 
