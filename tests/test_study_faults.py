@@ -73,7 +73,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     assert text.row("No partly written file after a kill", "1 file after 2 kills", "FAIL")
     resumed = ", ".join(f"{name} {'2 kills, other result' if name == 'design' else '0 kills'}" for name in COMMANDS)
     assert text.row(f"Same result after kills: {joined(COMMANDS)}", resumed, "FAIL")
-    unmoved = "cache of another version: no effect"
+    unmoved = "A cache written by another version is not used"
     assert text.row(unmoved, "not run; for a damaged cache file see tests/test_kept_jit.py", "NOT TESTED")
     for part in ("KeyError", "not noticed", "other files", "a trial broke"):
         assert part in text
@@ -90,14 +90,22 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     assert text.row(f"Same result after kills: {joined(COMMANDS)}", resumed, "PASS")
 
 
+OTHER = "with an empty cache; the other version itself gives a different one, so the test can fail"
+
+
 @pytest.mark.parametrize(
     ("same", "differs", "reached", "verdict"),
     [
-        (True, True, "the same result as with an empty cache; the other version gives another result", "PASS"),
+        (
+            True,
+            True,
+            f"the same result as {OTHER}",
+            "PASS",
+        ),
         (
             False,
             True,
-            "a result that differs from that with an empty cache; the other version gives another result",
+            f"a result that differs from that {OTHER}",
             "FAIL",
         ),
         (True, False, "not decisive: the other version gives the same result", "NOT TESTED"),
@@ -107,7 +115,7 @@ def test_another_cache_passes_only_where_it_could_have_failed(same, differs, rea
     made = [{"cache": "another version", "same": same, "differs": differs}]
     STUDY.write(Result(made, []), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
-    assert text.row("cache of another version: no effect", reached, verdict)
+    assert text.row("A cache written by another version is not used", reached, verdict)
 
 
 def test_the_small_study_is_a_part_of_the_full_one():

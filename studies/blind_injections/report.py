@@ -69,9 +69,10 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     verdicts = [goal.verdict for goal in judged]
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     whole = sum(trial.named_rightly for trial in sure)
+    interval = share_text(right, len(sure)).partition("(")[2].rstrip(")")
     answer = (
-        f"In trials with a hidden cause of the catalogue, {share_text(right, len(sure))} verdicts stated at {SURE:g} "
-        f"or more name no false cause, and {whole} of these name all hidden causes. In "
+        f"With a hidden cause of the catalogue, {right} of {len(sure)} verdicts stated at {SURE:g} or more name no "
+        f"false cause. The 95 % interval is {interval}; {whole} of them name all hidden causes. In "
         f"{share_text(sum(map(surely_misnamed, outside)), len(outside))} trials with an effect outside the catalogue a "
         f"cause of the catalogue was wrongly named with such a probability; {share_text(alarmed, len(nulls))} trials "
         "with nothing hidden raised an alarm."
