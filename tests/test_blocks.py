@@ -210,6 +210,7 @@ def posterior_of(case: SimpleNamespace, per_second: float) -> Posterior:
     return Posterior.of(case.model, [manoeuvre], step=0.25, window=0)
 
 
+@pytest.mark.slow
 def test_a_model_predicts_the_means_of_what_it_predicts_for_every_sample(recorded):
     every, means = posterior_of(recorded, 0.0), posterior_of(recorded, 10.0)
     z = every.starting_point()

@@ -112,6 +112,7 @@ def test_what_is_not_a_body_is_identified_where_no_body_is_unknown(study: Path, 
     assert "Posterior correlations" not in report
 
 
+@pytest.mark.slow
 def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     status, output = run("check", study, "--output", tmp_path / "check")
     assert status == 0, output

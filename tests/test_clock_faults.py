@@ -52,6 +52,7 @@ def test_a_parabola_is_exact_up_to_its_ends_and_goes_on_straight():
         np.testing.assert_allclose(resampled(jnp.asarray(beyond), UNEVEN, values), straight, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_third_power_of_the_samples_distance():
     errors = []
     for step in (0.4, 0.2, 0.1):

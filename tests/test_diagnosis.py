@@ -182,6 +182,7 @@ def shown(result: Diagnosis) -> dict[tuple[tuple[str, ...], str | None], float]:
     return {(item.causes, item.generic): item.probability for item in result.probabilities.sets}
 
 
+@pytest.mark.slow
 def test_probabilities_of_the_json(small):
     result = small()
     content = json.loads(json.dumps(result.to_dict()))

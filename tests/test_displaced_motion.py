@@ -122,6 +122,7 @@ def test_the_offset_of_a_slide_is_in_metres():
     assert all(unit == ("rad",) for label, unit in units.items() if label != "encoder-offset:slide")
 
 
+@pytest.mark.slow
 def test_a_late_joint_record_displaces_the_unknown_load():
     shown = Recorded(delay=0.2)
     assert share(truth(), simulated(shown), simulated(shown, JointLatency(), (0.2,))) < 1e-3

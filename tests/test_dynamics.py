@@ -112,7 +112,9 @@ ORBITS = {
 }
 
 
-@pytest.mark.parametrize("name", ORBITS)
+@pytest.mark.parametrize(
+    "name", ["ets7", *(pytest.param(name, marks=pytest.mark.slow) for name in ("branched", "servicer4"))]
+)
 def test_agrees_with_the_reference(name, tmp_path, formula_motion):
     """Perturbed links, orbit (elliptic for one), initial rate, held force and torque, a varying wheel momentum."""
     robot, rng = Robot.from_urdf(ROBOTS[name]), np.random.default_rng(7)
@@ -299,6 +301,7 @@ def test_integration_is_of_fourth_order(formula_motion):
             assert 11.0 < left / right < 24.0
 
 
+@pytest.mark.slow
 def test_padding_changes_nothing(formula_motion):
     """Recordings of different lengths are simulated side by side; steps of no length must not matter."""
     urdf = ROBOTS["planar"]

@@ -142,6 +142,7 @@ def test_degrees_are_refused_before_anything_is_computed(command: str, study: Pa
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_degrees_are_the_verdict_of_a_diagnosis(study: Path, tmp_path: Path) -> None:
     file = copy(study, tmp_path)
     recording = next(tmp_path.glob("*.csv"))
@@ -189,6 +190,7 @@ with _reported(), complete_folder(Path({str(tmp_path / "out")!r})) as folder:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_closed_folder_is_one_clear_error(study: Path, tmp_path: Path) -> None:
     closed = Path("/sys") if os.geteuid() == 0 else tmp_path / "closed"  # root may write wherever a disk lets it
     if os.geteuid() != 0:

@@ -243,7 +243,7 @@ def whole():
     return drawn(LinearGaussian())
 
 
-@pytest.mark.parametrize("calls", [None, 2, 60, 330])
+@pytest.mark.parametrize("calls", [None, 60, *(pytest.param(calls, marks=pytest.mark.slow) for calls in (2, 330))])
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, whole, tmp_path):
     """Interrupted between blocks, or at any evaluation (two per step and ensemble): the same samples bit for bit."""
     file, stub = tmp_path / "chain.h5", LinearGaussian()

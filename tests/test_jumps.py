@@ -75,8 +75,8 @@ def profile(begin: float, distance: float, time: np.ndarray = TIME) -> np.ndarra
     return distance * np.array([trapezoid(float(now) - begin, 60.0, 6.0) for now in time]).T
 
 
-@pytest.mark.parametrize("sigma", [1e-6, 1e-4])
-@pytest.mark.parametrize("begin", [11.54, 20.25, 33.46])
+@pytest.mark.parametrize("sigma", [1e-6, pytest.param(1e-4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("begin", [*(pytest.param(begin, marks=pytest.mark.slow) for begin in (11.54, 20.25)), 33.46])
 def test_errors_where_profiles_of_speed_begin_and_end_are_covered(begin, sigma):
     """Just after a sample, between two, and just before one; the acceleration itself jumps four times.
 
@@ -109,7 +109,7 @@ def ramp(now: float, begin: float, distance: np.ndarray, length: float) -> np.nd
     return np.outer(trapezoid(now - begin, length, 0.2 * length), distance)
 
 
-@pytest.mark.parametrize("move", [quintic, ramp])
+@pytest.mark.parametrize("move", [quintic, pytest.param(ramp, marks=pytest.mark.slow)])
 def test_errors_along_moves_in_a_row_are_covered(move):
     """Moves of 10 to 20 s with pauses of 0 to 3 s, at no times in particular: some 20 to 40 jumps in each joint.
 
@@ -132,6 +132,7 @@ def test_errors_along_moves_in_a_row_are_covered(move):
     assert (np.mean(squares, axis=0) > 0.5).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 2.0])
 def test_profiles_of_speed_are_not_taken_for_noise_of_the_encoder(factor):
     """Five moves in a row, each with four jumps, with as much noise as declared and with twice as much.
@@ -149,6 +150,7 @@ def test_profiles_of_speed_are_not_taken_for_noise_of_the_encoder(factor):
     assert found.ratio == pytest.approx(factor**2, abs=4.0 * factor**2 * np.sqrt(2.0 / found.degrees))
 
 
+@pytest.mark.slow
 def test_what_one_joint_cannot_show_all_together_do():
     """With coarser encoders, jumps are too small to be seen in most joints alone: fewer are found than together."""
     alone, together = 0, 0

@@ -46,11 +46,14 @@ def by_differences(posterior: Posterior, z: np.ndarray, arrays, push: Perturbati
     "effects",
     [
         (),
-        (
-            WheelMomentum(),
-            SensorBias.of(SensorKind.ACCEL)(1e-3),
-            SensorScale.of(SensorKind.RATE)(),
-            SensorLatency.of(SensorKind.ACCEL)(),
+        pytest.param(
+            (
+                WheelMomentum(),
+                SensorBias.of(SensorKind.ACCEL)(1e-3),
+                SensorScale.of(SensorKind.RATE)(),
+                SensorLatency.of(SensorKind.ACCEL)(),
+            ),
+            marks=pytest.mark.slow,
         ),
         pytest.param((FuelSlosh(), FlexibleAppendage()), marks=pytest.mark.slow),
     ],

@@ -150,6 +150,7 @@ def loop_of(*said: Review, **options) -> Loop:
     return Loop(PROBLEM, ENCODER, reviewer=Judge(said) if said else None, **settings)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("planned")
 def test_a_loop_stops_where_its_model_is_wrong(tmp_path: Path):
     history = loop_of(FINE, WRONG).run(Still(), tmp_path)

@@ -11,7 +11,8 @@ from bayesid.inference.posterior import Posterior
 from tests.conftest import SIGMA
 
 
-@pytest.mark.parametrize("size", [pytest.param(5.0, marks=pytest.mark.slow), 8.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [5.0, 8.0])
 def test_outliers_cost_what_their_density_says(planar_case, size):
     """A reading that is left out gives up its Gaussian density for the fraction of outliers over the channel's range.
 

@@ -267,7 +267,10 @@ def smoothed(times: np.ndarray, positions: np.ndarray) -> mj.Motion:
 
 
 @pytest.mark.skipif(not EXAMPLES.exists(), reason="the shared examples lie outside the repository and are not here")
-@pytest.mark.parametrize("name", ["nothing-hidden", "wheel-momentum", "accel-position"])
+@pytest.mark.parametrize(
+    "name",
+    ["nothing-hidden", *(pytest.param(name, marks=pytest.mark.slow) for name in ("wheel-momentum", "accel-position"))],
+)
 def test_leaves_only_noise_in_the_shared_examples(name, tmp_path):
     answer = json.loads((EXAMPLES / "answers.json").read_text())[name]
     settings = tomllib.loads((EXAMPLES / name / "study.toml").read_text())

@@ -923,6 +923,7 @@ def test_what_changes_the_readings_alone_has_no_disturbance(printed):
     assert "Reconstructed torque and force" not in text
 
 
+@pytest.mark.slow
 def test_an_unknown_cause_is_shown_as_a_torque_with_its_correlations(printed):
     result, text = printed(Status.UNKNOWN)
     assert sentences.wrench_sentence(result.unexplained) in text
@@ -934,6 +935,7 @@ def test_an_unknown_cause_is_shown_as_a_torque_with_its_correlations(printed):
     assert "Repeat a manoeuvre unchanged at a later time" in text
 
 
+@pytest.mark.slow
 def test_samples_are_compared_with_the_fit_and_not_reported_twice(biased, readings, tmp_path):
     changes, amplitudes = biased.parameter_changes, amplitudes_of(biased.after, "accel-bias")
     mean = np.array([item.fitted for item in changes])

@@ -99,6 +99,7 @@ def reference_log_evidence(readings: np.ndarray, signals: np.ndarray, prior: Riv
     return logsumexp(values, axis=0) - np.log(len(values))
 
 
+@pytest.mark.slow
 def test_the_predicted_rate_is_that_of_decisions_on_simulated_readings():
     """Readings are drawn, whitened, beside two nuisances of standard normal prior that are marginalised."""
     rng = np.random.default_rng(11)
@@ -123,6 +124,7 @@ def test_the_predicted_rate_is_that_of_decisions_on_simulated_readings():
         assert abs(left.rate - right.rate) < 3.0 * np.hypot(left.standard_error, right.standard_error)
 
 
+@pytest.mark.slow
 def test_the_blurred_rate_of_a_search_is_near_the_exact_one():
     signals = columns(np.random.default_rng(5))
     priors = [LEAK, WHEEL]

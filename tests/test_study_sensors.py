@@ -221,6 +221,7 @@ def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_ho
     assert "the cause is not known" in unknown
 
 
+@pytest.mark.slow
 def test_errors_of_smoothed_joints_are_overstated_at_most_by_the_motion_that_is_not_lost():
     """Motion that is lost can only add to the noise that passes, and the smoother states both."""
     flown = fly()

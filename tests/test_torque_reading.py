@@ -97,6 +97,7 @@ def test_torques_that_lack_nothing_raise_no_alarm(flown, seed):
     assert found.chi2_per_sample[0] == found.chi2_per_sample[1] == pytest.approx(1.0, abs=0.25)
 
 
+@pytest.mark.slow
 def test_a_torque_that_nobody_listed_is_unknown(flown, planar_truth):
     """A cable that pulls the joint back, as a spring does, by its position."""
     spring = 0.5 * (planar_truth.position[:, 1] - planar_truth.position[:, 1].mean())
