@@ -112,6 +112,40 @@ def test_what_is_not_a_body_is_identified_where_no_body_is_unknown(study: Path, 
     assert "Posterior correlations" not in report
 
 
+def test_simulated_recordings_do_not_replace_those_of_the_study(study: Path, tmp_path: Path) -> None:
+    file = copy(study, tmp_path)
+    before = {item.name: item.read_bytes() for item in tmp_path.iterdir()}
+    status, output = run("simulate", file, "--output", tmp_path)
+    assert status == 2
+    assert "Choose another output folder" in output
+    assert {item.name: item.read_bytes() for item in tmp_path.iterdir()} == before
+
+
+def test_an_interruption_waits_for_the_end_of_an_evaluation_of_emcee() -> None:
+    code = """
+import os, signal, sys, typer, emcee, numpy as np
+from bayesid.app.command_line import _command
+
+def density(x):
+    if not calls:
+        os.kill(os.getpid(), signal.SIGINT)
+    calls.append(1)
+    return -0.5 * np.sum(np.asarray(x) ** 2)
+
+calls = []
+def run():
+    sampler = emcee.EnsembleSampler(8, 2, density)
+    sampler.run_mcmc(np.random.default_rng(0).normal(size=(8, 2)), 100_000)
+    yield "not interrupted"
+
+typer.run(_command(run))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.startswith("Interrupted.")
+    assert "emcee" not in done.stdout + done.stderr
+
+
 @pytest.mark.slow
 def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     status, output = run("check", study, "--output", tmp_path / "check")

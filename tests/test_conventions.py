@@ -151,6 +151,24 @@ def test_remedies_replace_keys_and_add_sections() -> None:
         with_remedies("", ["sign = 1"])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sensors.rate.sigma = 1.0 # gyro\n[unknowns]\nbodies = []\n",
+        "sensors.rate = { sigma = 1.0 } # gyro\n[unknowns]\nbodies = []\n",
+        "[sensors] # gyro\nrate.sigma = 1.0\n[unknowns]\nbodies = []\n",
+    ],
+)
+def test_remedies_join_sections_without_a_header(text: str) -> None:
+    changed = with_remedies(text, ['[sensors.rate]\nunit = "deg/s"', '[joints."j"]\nsign = -1'])
+    assert tomllib.loads(changed) == {
+        "sensors": {"rate": {"sigma": 1.0, "unit": "deg/s"}},
+        "unknowns": {"bodies": []},
+        "joints": {"j": {"sign": -1}},
+    }
+    assert "# gyro" in changed
+
+
 def test_numbers_that_diverge_are_one_error_with_a_remedy_and_others_stay_as_they_are() -> None:
     for error in (np.linalg.LinAlgError("Matrix is not positive definite"), ValueError("Probability returned NaN")):
         with pytest.raises(DivergenceError, match=r"contradict the simulation .*bayesid check"), divergence_named():

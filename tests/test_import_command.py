@@ -181,6 +181,7 @@ def test_readings_outside_the_joints_messages_are_left_out_and_counted(writer, t
     read = Recording.read(tmp_path / "out" / "flight.csv")
     assert read.time[-1] == pytest.approx(20.0)
     assert "86 of 136 messages" in output
+    assert "Omitted: 50 messages (outside the selected window, or before or after the joints' messages)." in output
 
 
 def test_velocities_and_efforts_come_where_they_are_wanted(writer, tmp_path):
@@ -198,6 +199,13 @@ def test_velocities_and_efforts_come_where_they_are_wanted(writer, tmp_path):
         for joint in plain.joints:
             expected = factor * read.series(f"position.{joint}")[1]
             np.testing.assert_allclose(read.series(f"{family}.{joint}")[1], expected, rtol=1e-9)
+
+
+def test_velocities_that_are_not_there_are_an_error(writer, tmp_path):
+    status, output = run(writer.write(tmp_path, "ros1"), *TOPICS, "--velocity", "--output", tmp_path / "out")
+    assert status == 2
+    assert "contain no velocities" in output
+    assert not (tmp_path / "out").exists()
 
 
 def test_joints_without_positions_are_recorded_by_speed(writer, tmp_path):

@@ -234,6 +234,7 @@ def test_a_users_file_executes(tmp_path: Path):
         (SPACECRAFT, ("--wanted-tip", -1), ["-1 mm"]),
         (SPACECRAFT, ("--wanted-cause", "payload:link2=0.2"), ["0.2 is not a decisive probability"]),
         (SPACECRAFT, ("--no-diagnose", "--wanted-cause", "payload:link2"), ["the steps are not reviewed"]),
+        (SPACECRAFT, ("--wanted-cause", "payloads:link2"), ["unknown effect 'payloads:link2'", "payload"]),
         (SPACECRAFT, ("--at-most", 0), ["0 manoeuvres"]),
     ],
 )

@@ -91,3 +91,7 @@ def test_the_schema_is_printed_or_written_to_a_file(tmp_path):
     assert result.exit_code == 0, result.output
     written = json.loads((tmp_path / "new" / "study.schema.json").read_text(encoding="utf-8"))
     assert json.loads(printed.stdout) == written == json.loads(json.dumps(editor_schema()))
+    for folder in (tmp_path / "new", "."):
+        result = CliRunner().invoke(app, ["schema", "--output", str(folder)])
+        assert (result.exit_code, result.output.count("Error: ")) == (2, 1), result.output
+        assert "Give the name of the file to write" in result.output

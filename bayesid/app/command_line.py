@@ -16,11 +16,14 @@ import importlib
 import inspect
 import os
 import pkgutil
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache, wraps
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -46,6 +49,7 @@ FULL, CLOSED = (
 
 # objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles
 SELDOM = 100_000
+SOON = 0.003  # time after which an interruption is tried again [s]
 EXHAUSTED = "RESOURCE_EXHAUSTED"  # said by errors of JAX where memory is lacking
 LACKS_MEMORY = (
     "there is not enough memory for this study. Use fewer or shorter recordings, reduce blocks_per_second, or use a "
@@ -84,7 +88,7 @@ def _command(run: Callable[..., Iterator[str]]) -> Callable[..., None]:
     @wraps(run)
     def command(**given: Any) -> None:
         keep_compiled()
-        with _reported(), _shown() as progress:
+        with _reported(), _interruptible(), _shown() as progress:
             if len(options) < len(signature.parameters):
                 given["progress"] = progress
             for line in run(**given):
@@ -99,7 +103,7 @@ def _command(run: Callable[..., Iterator[str]]) -> Callable[..., None]:
 def _console() -> Console:
     from rich.console import Console
 
-    return Console(stderr=True)
+    return Console(stderr=True, emoji=False, highlight=False)  # names have colons, as in convention:zero:joint1
 
 
 @contextmanager
@@ -129,6 +133,31 @@ def _reported() -> Iterator[None]:
             err=True,
         )
         raise typer.Exit(130) from None
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let an interruption wait for the end of an evaluation of emcee, which prints all parameters where one ends it."""
+
+    def interrupt(signum: int, frame: FrameType | None) -> None:
+        inner = frame
+        while inner is not None:
+            if inner.f_code.co_name == "__call__" and inner.f_globals.get("__name__") == "emcee.ensemble":
+                signal.setitimer(signal.ITIMER_REAL, SOON)
+                return
+            inner = inner.f_back
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGALRM)}
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

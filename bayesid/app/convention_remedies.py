@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import tomlkit
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import write_text
@@ -102,6 +105,9 @@ def _write(lines: list[str], headers: Sequence[str], line: str) -> None:
     header, key = headers[-1], line.partition("=")[0].strip()
     number = headers.count(header) - 1 if header.startswith("[[") else 0
     if _place(lines, header, number) is None:
+        if not header.startswith("[[") and (merged := _merged(lines, header, line)) is not None:
+            lines[:] = merged
+            return
         lines += ["", header]
     start = _place(lines, header, number)
     assert start is not None
@@ -111,6 +117,20 @@ def _write(lines: list[str], headers: Sequence[str], line: str) -> None:
         lines[same[0]] = line
     else:
         lines.insert(start + 1, line)
+
+
+def _merged(lines: Sequence[str], header: str, line: str) -> list[str] | None:
+    """Return the lines with one more key in a section that is written without a header, None where it is not there."""
+    document = tomlkit.parse("\n".join(lines))
+    section: Any = document
+    added: Any = tomlkit.parse(f"{header}\n{line}")
+    while len(added) == 1 and isinstance(next(iter(added.values())), Mapping):
+        ((name, added),) = added.items()
+        section = section.get(name) if isinstance(section, Mapping) else None
+    if not isinstance(section, MutableMapping):
+        return None
+    section.update(added)
+    return tomlkit.dumps(document).splitlines()
 
 
 def _place(lines: Sequence[str], header: str, number: int = 0) -> int | None:

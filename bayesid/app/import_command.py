@@ -73,6 +73,7 @@ def run(
     ] = None,
 ) -> Iterator[str]:
     """Convert a ROS 1 or ROS 2 bag into a recording, NAME.csv, and document its origin in NAME.import.json."""
+    from bayesid._io.errors import InputError
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_conventions import imported_as
     from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag
@@ -96,6 +97,10 @@ def run(
     )
     imported = import_bag(bag, selected)
     recording = imported.recording
+    if velocity and not any(column.startswith("velocity.") for column in recording.channels):
+        raise InputError(
+            "the messages of the joints contain no velocities", file=bag, place="--velocity", remedy="Omit the option"
+        )
     if conventions:
         recording = recording.converted(imported_as(conventions, recording.joints))
     file = output / f"{recording.name}.csv"
@@ -123,7 +128,10 @@ def run(
 
 def _faults(topic: ImportedTopic) -> str:
     """Return what was left out of a topic and put in order, in one sentence, or nothing."""
-    parts = [f"{count} {'message' if count == 1 else 'messages'} ({text})" for text, count in topic.left_out.items()]
+    left_out = dict(topic.left_out)
+    if outside := topic.messages - topic.used - sum(left_out.values()):
+        left_out["outside the selected window, or before or after the joints' messages"] = outside
+    parts = [f"{count} {'message' if count == 1 else 'messages'} ({text})" for text, count in left_out.items()]
     text = f"Omitted: {'; '.join(parts)}. " if parts else ""
     return f"{text}Sorted by their stamps: {topic.reordered}. " if topic.reordered else text
 

@@ -27,13 +27,21 @@ def run(
     ] = False,
     fix: Annotated[
         Path | None,
-        typer.Option("--fix", metavar="STUDY.toml", help="Study in which wrong conventions are corrected."),
+        typer.Option(
+            "--fix",
+            metavar="STUDY.toml",
+            help="Correct wrong conventions in this study, asking before each; no argument is needed.",
+        ),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="Write the corrections without asking.")] = False,
 ) -> Iterator[str]:
     """Draft a study file for a robot and its recordings, and mark values that need to be checked."""
     if fix is not None:
         from bayesid.app.convention_remedies import fixed_study
+
+        if robot is not None or output is not None:
+            problem = "--fix changes a study, and takes neither a robot nor recordings nor --output"
+            raise InputError(problem, remedy=f"bayesid init --fix {fix}")
 
         yield from fixed_study(fix, (lambda question: True) if yes else typer.confirm)
         return

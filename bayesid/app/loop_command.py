@@ -56,7 +56,10 @@ def run(
     from bayesid.app.functions.loop_study import loop
     from bayesid.app.report_origin import report_origin
     from bayesid.report import loop_report
+    from bayesid.report.effect_catalogue import catalogue, entry_of
 
+    if wanted_cause is not None:
+        entry_of(wanted_cause.partition("=")[0], catalogue())  # before anything is flown
     asked: dict[str, Any] = {
         "spacecraft": spacecraft,
         "precision": precision,

@@ -25,8 +25,11 @@ def run(
         typer.echo(json.dumps(editor_schema(), indent=1))
         return
 
+    from bayesid._io.errors import InputError
     from bayesid._io.files import create_folder, write_json
 
+    if output.is_dir():
+        raise InputError("this is a folder", file=output, remedy="Give the name of the file to write")
     create_folder(output.parent)
     write_json(output, editor_schema())
     yield f"Wrote {output}. Reference it in the first line of a study: #:schema {output.name}"

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bayesid._io.errors import InputError
 from bayesid.app.options import Output, Seed, StudyFile
 
 __all__ = ["run"]
@@ -28,6 +29,10 @@ def run(
     from bayesid.app.report_origin import report_origin
     from bayesid.report import simulation_report
 
+    for section in study.recordings:
+        if output.resolve() == section.file.resolve().parent:
+            problem = "the folder contains the recordings of the study, which the simulated ones would replace"
+            raise InputError(problem, file=output, remedy="Choose another output folder")
     result = simulate(study, seed, noise=noise)
     with complete_folder(output) as folder:
         for recording in result.recordings:
@@ -38,4 +43,5 @@ def run(
             result.posterior, result.recordings, study.title, shown, planned=result.planned, origin=origin
         )
     yield str(result)
-    yield f"Wrote {output / 'report.pdf'}."
+    names = [f"{recording.name}.csv" for recording in result.recordings]
+    yield f"Wrote {', '.join(str(output / name) for name in (*names, 'report.pdf'))}."

@@ -16,7 +16,7 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.robot.wheel import Wheel
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior
 from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Model
@@ -146,17 +146,17 @@ def _parameters(effect: Effect) -> tuple[str, ...]:
     if effect.per_recording:
         lines.append("with separate values in every recording")
     if [quantity.name for quantity in effect.quantities] != [parameter.name for parameter in effect.parameters]:
-        alike = [list(group) for _, group in groupby(effect.quantities, key=lambda quantity: quantity.unit)]
-        lines.append(f"reported as {', '.join(f'{_names(group)} [{_unit(group[0].unit)}]' for group in alike)}")
+        alike = groupby(effect.quantities, key=lambda quantity: quantity.unit)
+        parts = [f"{_names([quantity.name for quantity in group])} [{_unit(unit)}]" for unit, group in alike]
+        lines.append(f"reported as {', '.join(parts)}")
     return tuple(lines)
 
 
 def _group(group: Sequence[Parameter]) -> str:
-    return f"{_names(group)} [{_unit(group[0].unit)}]: {_prior(group[0])}"
+    return f"{_names([parameter.name for parameter in group])} [{_unit(group[0].unit)}]: {_prior(group[0])}"
 
 
-def _names(group: Sequence[Quantity]) -> str:
-    names = [quantity.name for quantity in group]
+def _names(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= 10 else f"{names[0]} to {names[-1]}"
 
 
@@ -176,9 +176,9 @@ def _prior(parameter: Parameter) -> str:
 def _sizes(effect: Effect, model: Model) -> tuple[str, ...]:
     place = effect.label.partition(":")[2]
     where = f"{place} of {model.robot.name}" if place else model.robot.name
-    amplitudes: dict[str, list[Quantity]] = {}
+    amplitudes: dict[str, list[str]] = {}
     for quantity in effect.amplitude_quantities:
-        amplitudes.setdefault(quantity.unit, []).append(quantity)
+        amplitudes.setdefault(quantity.unit, []).append(quantity.name)
     return tuple(
         f"of {_names(amplitudes[bound.unit])} for {where}: "
         f"{f'{format_number(bound.largest)} {format_unit(bound.unit)}'.rstrip()}. {bound.reason}"

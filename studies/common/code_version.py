@@ -24,6 +24,11 @@ WORDS = ("bayesid/report", "bayesid/_io/words.py", "studies/common/report_parts.
 CODE = (".py", ".urdf", ".xml", ".toml", ".csv")  # endings of files that figures depend on
 OF_REPORT = ("report.py", "goals.py", "rows.py")  # files of a study that judge, word and draw what was computed
 
+# what reads options, calls the functions of the package and prints, which changes only the figures of studies of that
+COMMANDS = ("bayesid/app/*_command.py", "bayesid/app/command_line.py")
+REMEDIES = ("bayesid/app/convention_remedies.py",)
+STUDIED = {"faults": (*COMMANDS, *REMEDIES), "conventions": REMEDIES}
+
 
 class CodeVersion(NamedTuple):
     """Version of the code that made some figures."""
@@ -84,6 +89,8 @@ def _pieces(study: str) -> Iterator[str]:
     own = ROOT / "studies" / study
     folders = [*(ROOT / name for name in NUMBERS), own]
     words = [*(ROOT / name for name in WORDS), *(own / name for name in OF_REPORT)]
+    apart = {*COMMANDS, *REMEDIES} - {*STUDIED.get(study, ())}
+    words += [file for pattern in apart for file in ROOT.glob(pattern)]
     for file in sorted(file for folder in folders for file in folder.rglob("*")):
         if file.suffix in CODE and not any(file.is_relative_to(word) for word in words):
             yield f"{file.relative_to(ROOT)} {_content(file)}"
