@@ -159,7 +159,7 @@ def test_a_loop_stops_where_its_model_is_wrong(tmp_path: Path):
     reviewed = json.loads((tmp_path / "step-2-diagnosis.json").read_text())["recordings"]
     assert reviewed == ["step-1-recording", "step-2-recording"]
     text = list(loop_sentences(history))
-    assert "Step 2: the recordings so far are explained: payload:link2 (98 %)." in text
+    assert "Step 2: the verdict on the recordings so far is explained: payload:link2 (98 %)." in text
     assert "The model is wrong: after 2 manoeuvres, the recordings indicate payload:link2. The loop stops." in text
     # even where what is wanted is reached: it would be known well of the wrong model
     again = loop_of(FINE, WRONG, goals=(RelativePrecision(1.0),)).run(Still(), tmp_path)

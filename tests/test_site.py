@@ -28,7 +28,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(
         not all(map(is_there, NEEDED)) and not os.environ.get("CI"),
-        reason='the site needs the extra docs: pip install -e ".[docs]"',
+        reason='the site needs the extra docs: pip install -e ".[docs,test]"',
     ),
 ]
 

@@ -177,7 +177,11 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
         kept = "every limit is satisfied" if design.go else "at least one limit is not satisfied"
         lines.append(f"{design.name}: {size}{kept} with 99 % probability under the present uncertainty of the robot.")
     separated = [design for design in designs if design.designed_by is not None and design.designed_by.rivals]
-    return [*lines, *map(separation_sentence, separated), f"Best: {best.name}."]
+    return [
+        *lines,
+        *map(separation_sentence, separated),
+        f"Best by the determinant of the posterior covariance: {best.name}.",
+    ]
 
 
 def separation_sentence(design: Design) -> str:
@@ -186,13 +190,13 @@ def separation_sentence(design: Design) -> str:
     if criterion is None or not criterion.rivals:
         raise ValueError(f"{design.name} was not designed to separate effects")
     rates = [
-        f"{format_percent(rate.rate, 3)} of its readings (standard error {format_percent(rate.standard_error, 1)}) if "
+        f"{format_percent(rate.rate, 3)} of flights (standard error {format_percent(rate.standard_error, 1)}) if "
         f"{label} is the cause"
         for label, rate in design.decisions.items()
     ]
     return (
-        f"{design.name} distinguishes {joined(criterion.rivals)}: a probability of {format_number(DECISION)} or more "
-        f"for the correct one, both equally probable beforehand, is expected from {joined(rates)}. Sizes and "
+        f"{design.name} distinguishes {joined(criterion.rivals)}: if both are equally probable beforehand, the correct "
+        f"one is expected to reach a probability of {format_number(DECISION)} in {joined(rates)}. Sizes and "
         "directions follow the prior of a diagnosis: sizes are log-uniform, from those that no "
         "manoeuvre resolves to the largest plausible ones."
     )

@@ -168,11 +168,12 @@ def practical_sentences(result: Practical) -> list[str]:
     if directions:
         plural = "direction is" if directions == 1 else "directions are"
         sentences.append(f"{directions} of {len(result.directions)} {plural} not learnt.")
-    sentences.append(f"The worst known direction: {result.words[0]}.")
+    subject, _, known = result.words[0].partition(": ")
+    sentences.append(f"The least well determined direction is {subject}: {known}.")
     worst = min(result.parameters, key=lambda item: item.shrinkage)
     sentences.append(
-        f"The worst known parameter: {worst.name}, {format_percent(1.0 - worst.shrinkage)} of the prior's width remains"
-        f"{_confused(worst)}."
+        f"The least well determined parameter is {worst.name}: {format_percent(1.0 - worst.shrinkage)} of the prior's "
+        f"width remains{_confused(worst)}."
     )
     return sentences
 

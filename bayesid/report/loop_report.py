@@ -132,7 +132,7 @@ def loop_sentences(history: History) -> Iterator[str]:
 
 def review_words(review: dict[str, Any]) -> str:
     """Return the verdict on the recordings up to a step."""
-    words = f"the recordings so far are {review['status']}"
+    words = f"the verdict on the recordings so far is {review['status']}"
     if review["causes"]:
         likely = (f"{name} ({format_percent(review['probabilities'].get(name, 0.0))})" for name in review["causes"])
         words += f": {joined(likely)}"

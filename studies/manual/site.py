@@ -84,7 +84,7 @@ def write_site(folder: Path) -> None:
         from mkdocs.commands.build import build
         from mkdocs.config import load_config
     except ImportError as error:
-        remedy = 'Install the extra: pip install -e ".[docs]"'
+        remedy = 'Install the extra: pip install -e ".[docs,test]"'
         raise InputError(f"the site needs {error.name}, which is not installed", remedy=remedy) from error
     with tempfile.TemporaryDirectory() as work:
         typ, docs = Path(work) / "typst", Path(work) / "docs"

@@ -119,6 +119,11 @@ def verdict_sentence(result: Diagnosis) -> str:
         case Status.UNRESOLVED:
             sets = result.probabilities.sets[:SHOWN_SETS]
             most = "; ".join(f"{set_text(item.names)} ({probability_text(item.probability)})" for item in sets)
+            if not sets[0].names:
+                return (
+                    "Unresolved: a test of the residuals raised the alarm, but that no cause is present is the most "
+                    f"probable explanation. The most probable sets are: {most}."
+                )
             return (
                 "Unresolved: the residuals contain more than noise, but the probability is spread over too many "
                 f"explanations for a cause to be named. The most probable sets are: {most}."
