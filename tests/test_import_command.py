@@ -181,7 +181,7 @@ def test_readings_outside_the_joints_messages_are_left_out_and_counted(writer, t
     read = Recording.read(tmp_path / "out" / "flight.csv")
     assert read.time[-1] == pytest.approx(20.0)
     assert "86 of 136 messages" in output
-    assert "Omitted: 50 messages (outside the selected window, or before or after the joints' messages)." in output
+    assert "Omitted: 50 messages (before the first or after the last message of the joints)." in output
 
 
 def test_velocities_and_efforts_come_where_they_are_wanted(writer, tmp_path):

@@ -118,19 +118,21 @@ def run(
         }
         write_json(folder / f"{recording.name}.import.json", content)
     yield f"Time 0 is the stamp {format_stamp(imported.start)} s; the recording lasts {recording.time[-1]:.6g} s."
+    whole = (start, end, duration) == (0.0, None, None)
     for topic in imported.topics:
         yield (
             f"{topic.name}: {topic.used} of {topic.messages} messages, interval {topic.interval:.4g} s, "
-            f"longest gap {topic.longest_gap:.4g} s. {_faults(topic)}{_meaning(topic)}"
+            f"longest gap {topic.longest_gap:.4g} s. {_faults(topic, whole)}{_meaning(topic)}"
         )
     yield f"Wrote {file}."
 
 
-def _faults(topic: ImportedTopic) -> str:
-    """Return what was left out of a topic and put in order, in one sentence, or nothing."""
+def _faults(topic: ImportedTopic, whole: bool) -> str:
+    """Return what was left out of a topic and put in order; of the whole bag also what no joint accompanies."""
     left_out = dict(topic.left_out)
-    if outside := topic.messages - topic.used - sum(left_out.values()):
-        left_out["outside the selected window, or before or after the joints' messages"] = outside
+    outside = topic.messages - topic.used - sum(left_out.values())
+    if whole and outside:
+        left_out["before the first or after the last message of the joints"] = outside
     parts = [f"{count} {'message' if count == 1 else 'messages'} ({text})" for text, count in left_out.items()]
     text = f"Omitted: {'; '.join(parts)}. " if parts else ""
     return f"{text}Sorted by their stamps: {topic.reordered}. " if topic.reordered else text
