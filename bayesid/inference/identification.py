@@ -447,7 +447,8 @@ def identify(
         raise InputError(
             f"no values of the unknowns fit the data: chi-square per sample is {optimum.chi2 / refined.samples:.2g} "
             "after the fit, where noise alone gives 1",
-            remedy="Run `bayesid check` and `bayesid diagnose` to examine attitudes, units and missing causes",
+            remedy="Run `bayesid check` and `bayesid diagnose` to examine attitudes, units, the declared noise and "
+            "missing causes",
         )
     rng = np.random.default_rng(weights)
     parameterisation = choose_parameterisation(refined, optimum, rng)

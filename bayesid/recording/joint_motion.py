@@ -221,7 +221,7 @@ def check_joints(recording: Recording, robot: Robot) -> None:
             parts.append(f"no position or velocity for joint {', '.join(missing)}")
         if strangers:
             parts.append(f"joint {', '.join(strangers)} is not a joint of the robot")
-        remedy = f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path"
+        remedy = f"Record exactly the robot's moving joints ({', '.join(known)}), or correct the path of the robot"
         if spun := [name for name in missing if name in recording.wheels]:
             remedy = f"A wheel of [[robot.wheels]] is not a joint: make {', '.join(spun)} fixed in the URDF"
         raise InputError("; ".join(parts), file=recording.file or recording.name, remedy=remedy)
