@@ -234,7 +234,7 @@ BAD = {
     "NaN": ("recording", cell(4, "rate.x", "nan"), ["rate.x", "nan", "line 6"]),
     "not monotonic": ("recording", cell(5, "time", "0.0"), ["time", "line 7"]),
     "missing column": ("recording", drop("rate.y"), ["rate.y"]),
-    "missing joint": ("recording", drop("position.joint3"), ["joint3", "Record every moving joint"]),
+    "missing joint": ("recording", drop("position.joint3"), ["joint3", "Record exactly the robot's moving joints"]),
     "empty file": ("recording", lambda text: "", ["empty"]),
     "joints in degrees": ("recording", scale("position.", 57.29577951308232), ["position.joint", "radians"]),
     "rate in degrees": ("recording", scale("rate.", 57.29577951308232), ["rate", "degrees per second"]),

@@ -134,7 +134,7 @@ def test_joints_that_do_not_match_the_robot(drop, add, message):
     channels |= {f"position.{name}": np.zeros_like(TIME) for name in add}
     with pytest.raises(InputError, match=message) as caught:
         MeasuredMotion.from_recording(recording(channels), Robot.from_urdf(BRANCHED), sigma={0: 1e-6})
-    assert "Record every moving joint of the robot" in str(caught.value)
+    assert "Record exactly the robot's moving joints" in str(caught.value)
 
 
 # impossible motion ----------------------------------------------------------------------------------------------------
