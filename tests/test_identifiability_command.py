@@ -188,7 +188,11 @@ def test_joint_motion_alone_gives_a_prediction_that_the_fit_bears_out(
 BAD = {
     "file": ("planar.csv", "absent.csv", ["absent.csv", "there is no such file"]),
     "effect": ("gravity-gradient", "gravity-gradiant", ["study.toml", "gravity-gradiant"]),
-    "joint left out": ("planar.urdf", "ets7.urdf", ["planar.csv", "joint3", "Record exactly the robot's moving joints"]),
+    "joint left out": (
+        "planar.urdf",
+        "ets7.urdf",
+        ["planar.csv", "joint3", "Record exactly the robot's moving joints"],
+    ),
     "body": ('bodies = ["base_link"]', 'bodies = ["base"]', ["study.toml", "'base'"]),
 }
 

@@ -51,7 +51,8 @@ def test_a_picture_states_its_commands_and_inputs(task):
     # a changed input asks for a new picture
     assert stored["inputs"] == {name: digest(INPUTS / name) for name in task.inputs}
     named = {word for command in task.commands for word in command.split() if word.endswith(".toml")}
-    assert named == set(task.inputs)
+    made_before = {name for name in named if name.startswith("out/")}  # by the demonstration, or from its study
+    assert named - made_before == set(task.inputs)
 
 
 def test_every_input_is_read_and_valid():
