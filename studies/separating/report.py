@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid import InputError
+from bayesid._io.words import joined
 from bayesid.design import Store
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
@@ -120,8 +121,8 @@ def _report(result: Result) -> Report[Result]:
         title="Separating two causes",
         subtitle="A manoeuvre designed to separate rivals, ETS-VII in MuJoCo",
         question="Residual wheel momentum and a leaking valve are hard to distinguish on a slowly drifting base; so "
-        "are the causes of three further pairs. Does a second manoeuvre that is designed to separate them identify the "
-        "true cause?",
+        "are the causes of three further pairs (leak and pulses, wheel and dipole, payload and link error). Does a "
+        "second manoeuvre that is designed to separate them identify the true cause?",
         answer=f"The separating manoeuvre identifies the hidden cause in {_counts(first, LAST)}. An identified cause "
         f"has a probability of {SURE:g} or more against its rival. The first manoeuvre alone identifies it in "
         f"{_counts(first, 'first alone')}; with a d-optimal second one it is identified in "
@@ -181,16 +182,20 @@ def _failures(document: Document, result: Result) -> None:
         if realised.direction == "stated":
             wrong = int((realised.factors[LAST] <= -NEEDED).sum())
             texts.append(
-                f"Hidden {pair.pair.cause(realised.label).words}: after the first manoeuvre alone the mean log Bayes "
-                f"factor for the cause against no cause is {format_fixed(realised.detected.mean(), 1)} "
-                f"({format_number(NEEDED, 2)} is a probability of {SURE:g}). With the separating manoeuvre the wrong "
-                f"cause has a probability of {SURE:g} or more in {wrong} of {len(realised.detected)} flights."
+                f"{pair.pair.name.capitalize()}, hidden {pair.pair.cause(realised.label).words}: after the first "
+                "manoeuvre alone the mean log Bayes factor for the cause against no cause is "
+                f"{format_fixed(realised.detected.mean(), 1)} ({format_number(NEEDED, 2)} is a probability of "
+                f"{SURE:g}). With the separating manoeuvre the wrong cause has a probability of {SURE:g} or more in "
+                f"{wrong} of {len(realised.detected)} flights."
             )
     texts.append(
         "The full diagnosis with its catalogue was not run here: the models contain only two causes each. A leak or "
-        "pulses with a net force were not hidden. The prior of a payload in a diagnosis also requires a positive mass, "
-        "which the design and this study do not."
+        "pulses with a net force were not hidden. The prior of a payload in a diagnosis requires a positive mass; that "
+        "of the design and of this study does not."
     )
+    flown = [pair.pair.name for pair in result.pairs]
+    if missing := [name for name in PAIRS if name not in flown]:
+        texts.insert(0, f"Pairs that were not run: {joined(missing)}.")
     document.items(texts)
 
 

@@ -84,7 +84,7 @@ CHOICES = {
     "unknown half as probable": "half the prior probability of a cause outside the catalogue",
     "unknown twice as probable": "twice the prior probability of a cause outside the catalogue",
     "bounds a decade higher": "largest plausible sizes of all causes ten times as large",
-    "floors a decade lower": "smallest sizes of all causes ten times as small",
+    "floors a decade lower": "smallest sizes of all causes one tenth as large",
 }
 """What each choice of the sensitivity changes, by its name in diagnosis.json."""
 
@@ -121,9 +121,9 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
         ],
         candidate_rows(result.candidates, result.alarm.level),
         f"All {len(result.candidates)} candidates, each added alone to the present model, in the linear approximation. "
-        "The probability is that of being present, alone or with other causes. Sizes, of candidates that stand out, "
-        "and 95 % limits, of the others, apply only if the candidate is the only cause: they are no measurements in "
-        "addition to a named cause. Empty cells were not evaluated.",
+        "The probability is that of being present, alone or with other causes. Candidates that stand out have a size, "
+        "the others a 95 % limit. Both apply only if the candidate is the only cause, not if it acts in addition to a "
+        "named cause. Empty cells were not evaluated.",
     )
 
 
