@@ -204,8 +204,8 @@ def test_false_names_are_compared_with_what_was_stated_decade_by_decade():
     sure, mistaken = (replace(trial, probability=0.9995) for trial in (right, wrong))
     judged = _reliable([right] * 95 + [wrong] * 5 + [sure] * 9 + [mistaken])
     assert judged.verdict is Verdict.FAIL
-    assert "0.9 to 0.99: 5 of 100, 5.0 stated" in judged.reached
-    assert "0.999 to 1: 1 of 10, 0.0 stated" in judged.reached
+    assert "0.9 to 0.99: 5 of 100, 5 expected" in judged.reached
+    assert "0.999 to 1: 1 of 10, 0.005 expected" in judged.reached
 
 
 def test_one_kind_of_outside_effect_must_not_be_misnamed_however_few_others_are():
@@ -283,8 +283,10 @@ def test_a_goal_is_decided_by_its_interval():
     assert _most("", 0.03, 0, 200).verdict is Verdict.PASS
     assert _most("", 0.03, 30, 200).verdict is Verdict.FAIL
     rng = np.random.default_rng(1)
-    assert _scatter("", rng.normal(size=4000)).verdict is Verdict.PASS
-    assert _scatter("", 1.5 * rng.normal(size=4000)).verdict is Verdict.FAIL
+    assert _scatter("", list(rng.normal(size=(4000, 1)))).verdict is Verdict.PASS
+    assert _scatter("", list(1.5 * rng.normal(size=(4000, 1)))).verdict is Verdict.FAIL
+    # ten equal errors of one trial are one
+    assert _scatter("", list(np.repeat(rng.normal(size=(400, 1)), 10, axis=1))).verdict is Verdict.OPEN
 
 
 def test_torques_and_coverage_are_decided_by_their_intervals():
