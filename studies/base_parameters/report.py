@@ -152,10 +152,9 @@ def _report(result: Result) -> Report[Result]:
         "numbers do motion and joint torques determine, and what fixes the scale of the masses, which motion alone "
         "does not determine?",
         answer=f"Motion and joint torques determine {arm.count} independent linear combinations of the "
-        f"{len(arm.standard)} inertial parameters of ETS-VII, and {planar.count} of {len(planar.standard)} for a robot "
-        "with two joints. Motion alone does not "
-        "determine the scale of all masses; the gravity gradient does not provide it either, but one known body, "
-        "torque or thrust does.",
+        f"{len(arm.standard)} inertial parameters of ETS-VII. Of a robot with two joints they determine {planar.count} "
+        f"of {len(planar.standard)}. Motion alone does not determine the scale of all masses; the gravity gradient "
+        "does not provide it either, but one known body, torque or thrust does.",
         goals=goals_of(result),
         valid="bodies are rigid and joints ideal, without friction and rotors. How well a manoeuvre with noisy sensors "
         "determines each sum is a separate question, which the posterior answers.",

@@ -68,12 +68,12 @@ def _report(result: Result) -> Report[Result]:
         subtitle="Within 50 mm/s and 5 degrees per second at the tip",
         question="How long must the arm move within the flight rule until mass and moments of inertia of the base "
         "are determined to 1 %, and with which sensors?",
-        answer="With each link's mass uncertain by 5 % (1 sigma), the least well determined of the base's mass and "
-        f"moments of inertia stays uncertain by at least {format_percent(_least(result), 2)}, however long the arm "
-        "moves and whatever rate sensor and accelerometer are used. Motion determines masses only relative to the "
-        "arm's; an absolute scale needs joint torques or a known thrust. With the arm known exactly one manoeuvre of "
-        f"{mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with sensors of 10⁻⁵ "
-        "rad/s and 10⁻⁵ m/s².",
+        answer="With an uncertain arm, no duration and no sensor of motion determines the base to better than "
+        f"{format_percent(_least(result), 2)}. This is the largest of the relative standard deviations of its mass and "
+        "moments of inertia, with each link's mass uncertain by 5 % (1 sigma). Motion determines masses only relative "
+        "to the arm's; an absolute scale needs joint torques or a known thrust. With the arm known exactly one "
+        f"manoeuvre of {mission.DURATION:g} s gives {format_percent(result.after['designed'].worst(True), 2)}, with "
+        "sensors of 10⁻⁵ rad/s and 10⁻⁵ m/s².",
         goals=goals(result),
         valid="wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
         "and noise is white. Every repetition starts at a new unknown rate; bias and arm stay the same.",

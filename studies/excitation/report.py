@@ -236,9 +236,9 @@ def _report(result: Result) -> Report[Result]:
         title="The most informative manoeuvre for the base",
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
-        answer="Compared with the manoeuvre of the best condition number, the d-optimal manoeuvre reduces the "
-        f"geometric mean of the base's ten standard deviations by a factor of {factors[HEADLINE]:.2f} "
-        f"({ARMS[HEADLINE]}) or {factors[IDEAL]:.2f} ({ARMS[IDEAL]}). The standard deviation of the mass alone, which "
+        answer="Compared with the best condition number, the d-optimal manoeuvre reduces the base's standard "
+        f"deviations by a factor of {factors[HEADLINE]:.2f}. This is the factor of their geometric mean, "
+        f"{ARMS[HEADLINE]}; {ARMS[IDEAL]}, it is {factors[IDEAL]:.2f}. The standard deviation of the mass alone, which "
         f"is limited by the arm, falls by a factor of {_of_mass(contest):.2f}; {_starts(result)}.",
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "

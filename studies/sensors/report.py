@@ -123,9 +123,9 @@ def _answer(result: Result) -> str:
     best = result.joints[level][LIKELIHOOD]
     mass, moment = tables.equal_rms(result, level, PAPER)
     return (
-        f"With noise of {level} one manoeuvre determines the mass to {tables.rms_of(best, MASS)} % and the least well "
-        f"determined moment of inertia to {tables.rms_of(best, best.worst())} % (brackets: Monte-Carlo error of the "
-        "last digits); the paper expects 2 %. Both are results of the package's likelihood; the paper's procedure "
+        f"With noise of {level} one manoeuvre determines the mass to {tables.rms_of(best, MASS)} %; the paper expects "
+        f"2 %. The least well determined moment of inertia follows to {tables.rms_of(best, best.worst())} % (brackets: "
+        "Monte-Carlo error of the last digits). Both are results of the package's likelihood; the paper's procedure "
         f"gives {mass} % and {moment} %."
     )
 
