@@ -168,9 +168,9 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
         slack = 0.1 * (joint.upper - joint.lower) if np.isfinite(joint.upper - joint.lower) else 0.0
         outside = (position < joint.lower - slack) | (position > joint.upper + slack)
         other = (
-            "Give positions in radians, not degrees"
+            "If the positions are in degrees, give them in radians"
             if joint.unit == "rad"
-            else "Give positions in metres, not millimetres"
+            else "If the positions are in millimetres, give them in metres"
         )
         if outside.any():
             row, count = int(np.argmax(outside)), int(outside.sum())
