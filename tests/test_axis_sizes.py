@@ -41,6 +41,7 @@ def test_an_absent_axis_is_as_small_as_the_data_can_resolve():
     assert np.median([axis_sizes(*drawn([0.0, 1.0], seed, rows)).ratios[0] for seed in range(20)]) < 1.0 / rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deviations", [[0.2, 1.0], [1.0, 1.0], [0.03, 1.0]])
 def test_the_charge_is_that_of_an_average_over_all_ratios(deviations):
     """The evidence at the sizes less the charge, beside the mean over uniform ratios of standard deviations."""

@@ -125,6 +125,7 @@ def test_what_could_not_be_weighed_is_no_candidate_and_is_named(kind, message, p
         candidates(planar_case.posterior.model)
 
 
+@pytest.mark.slow
 def test_it_joins_the_simulation(result):
     fit = result.before.fit
     model, before = fit.posterior.model, fit.posterior

@@ -62,6 +62,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     metafunc.parametrize("case", cases)
 
 
+@pytest.mark.slow
 def test_what_is_hidden_is_said(case, tmp_path):
     result = diagnosed(case.make(tmp_path, SEED, STRONGER.get(case.name, 1.0)))
     verdict = result.verdict

@@ -57,6 +57,7 @@ def changed(recording: Recording, **channels: np.ndarray) -> Recording:
     return Recording(recording.name, None, recording.time, {**recording.channels, **names})
 
 
+@pytest.mark.slow
 def test_a_clean_recording_gives_no_warning(model: Model, recording: Recording) -> None:
     found = check(model, recording)
     assert found.warnings == ()

@@ -41,6 +41,7 @@ def test_a_curve_goes_through_its_samples():
     np.testing.assert_allclose(resampled(jnp.asarray(UNEVEN), UNEVEN, values), values, rtol=0.0, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_parabola_is_exact_up_to_its_ends_and_goes_on_straight():
     values = np.stack([UNEVEN**2 - 3.0 * UNEVEN, 0.5 * UNEVEN + 1.0], axis=1)
     at = np.linspace(UNEVEN[0], UNEVEN[-1], 333)

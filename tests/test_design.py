@@ -140,6 +140,7 @@ def test_base_motion_of_a_flywheel_in_closed_form(flywheel: Problem) -> None:
     assert costs["paper-26-intended"] == pytest.approx(largest, rel=0.01)
 
 
+@pytest.mark.slow
 def test_base_motion_of_a_slider_in_closed_form() -> None:
     own = plan("slider")
     trajectory = jax.jit(lambda p: Flight(own, p, jnp.zeros(own.unknowns.size)).trajectory())(PARAMETERS)

@@ -72,6 +72,7 @@ def test_one_step_predicts_what_refits_without_a_recording_do(wheel):
         np.testing.assert_allclose(_held_out_by_steps(hypothesis.fit, folds_of(2)), refitted, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_refits_without_a_recording_run_on_any_executor(wheel):
     """In threads, and after the way to another process."""
     with ThreadPoolExecutor(2) as threads:
@@ -126,6 +127,7 @@ def test_a_panel_of_little_damping_between_two_tones_of_the_grid_is_named_alone(
     assert found[0] == pytest.approx(0.3203, abs=0.001)  # Hz, as hidden
 
 
+@pytest.mark.slow
 def test_the_extended_posterior_agrees_with_the_pushes(wheel):
     """The full simulation with the effect in it leaves the same residual as the pushes on the present model."""
     posterior = wheel.posterior
@@ -202,6 +204,7 @@ def test_probabilities_of_the_json(small):
     assert sum(order) <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_the_probabilities_of_all_sets_sum_to_one(small):
     result = small()
     found, probability = result.probabilities, result.to_dict()["probability"]

@@ -128,6 +128,7 @@ def test_a_late_joint_record_displaces_the_unknown_load():
     assert share(truth(), simulated(shown), simulated(shown, JointLatency(), (0.2,))) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["joint1", "joint2", "joint3"])
 def test_a_flexible_joint_has_one_stiffness_whatever_the_posture_at_the_start(joint):
     """The stiffness is that at zero, where no joint ever is; the robot's load is the true one."""

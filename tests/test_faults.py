@@ -106,6 +106,7 @@ NARROW = settings(
 """The same changes in every run; the study makes more of them."""
 
 
+@pytest.mark.slow
 @NARROW
 @example(change=Spoilt(".urdf", "another byte", 0.4, ""))
 @example(change=Spoilt(".csv", "replace a value", 0.5, "1e300"))

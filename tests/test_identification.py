@@ -93,6 +93,7 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
     assert integration_error_at(posterior, optimum.z) < 0.01
 
 
+@pytest.mark.slow
 def test_the_error_of_an_integrated_attitude_is_its_angle_however_the_base_is_turned() -> None:
     robot, time = Robot.shipped("planar"), np.arange(0.0, 40.01, 0.5)
     body = BodyPrior("base_link", robot.link("base_link").inertial, 1.0)

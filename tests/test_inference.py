@@ -177,6 +177,7 @@ def test_a_chain_that_ends_before_the_window_is_not_called_short():
     assert autocorrelation_time(still) == 30.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trusted", [False, True])
 def test_means_scatter_as_the_effective_samples_say(trusted):
     """Over 15 seeds and four coordinates, within four standard errors; the worst coordinate sets the size."""
@@ -188,6 +189,7 @@ def test_means_scatter_as_the_effective_samples_say(trusted):
     assert 0.64 < np.sqrt(np.mean(np.square(off))) < 1.36
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_chains_and_another_does_not(tmp_path):
     first, again, other = (drawn(LinearGaussian(), seed=seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(first.z, again.z)
@@ -271,6 +273,7 @@ def test_an_interrupted_run_stops_where_the_uninterrupted_one_did(calls, tmp_pat
     np.testing.assert_array_equal(resumed.z, whole.z)
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_read_not_repeated(tmp_path):
     stub, file = LinearGaussian(), tmp_path / "chain.h5"
     first = drawn(stub, file=file)
@@ -288,6 +291,7 @@ def chain(tmp_path_factory):
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["seed", "data", "names", "version"])
 def test_another_runs_file_is_refused(change, chain, tmp_path, monkeypatch):
     file = Path(shutil.copy(chain, tmp_path))

@@ -161,6 +161,7 @@ def test_what_one_joint_cannot_show_all_together_do():
     assert together > 1.3 * alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma", [1e-6, 1e-5, 1e-4])
 def test_smooth_motion_has_no_jump(sigma):
     """Sums of sines: seven joints of four recordings."""

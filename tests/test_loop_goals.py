@@ -167,6 +167,7 @@ def test_a_loop_stops_where_its_model_is_wrong(tmp_path: Path):
     assert loop_of(WRONG, goals=(RelativePrecision(1.0),)).run(Still(), tmp_path / "other").status == "wrong-model"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("planned")
 def test_the_result_of_a_loop_names_its_bodies_goals_and_causes(tmp_path: Path):
     result = LoopResult("Träger", loop_of(FINE, WRONG).run(Still(), tmp_path))
@@ -194,6 +195,7 @@ def test_a_loop_that_waits_has_a_result_without_bodies(tmp_path: Path):
     assert f"Fly {step.plan}" in str(result)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("planned")
 def test_a_loop_that_asks_for_a_cause_goes_on_until_it_is_decided(tmp_path: Path):
     goals = (CauseProbability("payload:link2"),)

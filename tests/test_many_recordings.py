@@ -167,6 +167,7 @@ def test_a_proposal_is_fitted_to_a_prior_that_data_cut_off() -> None:
     np.testing.assert_allclose(mean, [np.sqrt(2.0 / np.pi), 0.0, 0.0, 0.0, 0.0, 0.0], atol=0.07)
 
 
+@pytest.mark.slow
 def test_a_sampler_ends_at_its_time(planar_posterior: Callable[..., Posterior]) -> None:
     from bayesid.inference.ensemble import sample
 

@@ -86,6 +86,7 @@ def test_a_scheduler_that_does_not_answer_is_one_clear_error(monkeypatch):
         executor_at("tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_was(tmp_path):
     store, tasks = tmp_path / "trials.jsonl", range(8)
     code = f"from tests.test_monte_carlo import *; run_trials(slow, range(8), {str(store)!r}, seed=2)"

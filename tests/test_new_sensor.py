@@ -117,6 +117,7 @@ def flown() -> tuple[Model, Posterior, np.ndarray]:
     return model, Posterior.of(model, [Manoeuvre(recording, measured)], step=STEP), z
 
 
+@pytest.mark.slow
 def test_it_reads_what_it_should(flown):
     """Against the geometry itself: the Sun turned into the base by the attitude, then into the sensor."""
     model, posterior, z = flown
@@ -140,6 +141,7 @@ def test_it_reads_what_it_should(flown):
     assert np.ptp(both.sun, axis=0).max() > 0.1  # the base does turn
 
 
+@pytest.mark.slow
 def test_it_identifies(flown):
     _, posterior, z = flown
     assert posterior.model.channels.names == (

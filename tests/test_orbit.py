@@ -146,6 +146,7 @@ def reference_torque(radius: float, quaternion: np.ndarray, file) -> np.ndarray:
     return wrench[3:]
 
 
+@pytest.mark.slow
 def test_a_kilometre_of_radius_changes_the_torque_by_the_order_of_1e_6_newton_metres(tmp_path):
     """At most 3 mu / R^3 (I3 - I1) / 2 x 3 km / R = 3.2e-6 N m, of a largest torque of 7.3e-3 N m."""
     radii = (6.916e6, 6.917e6)

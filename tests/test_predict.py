@@ -57,6 +57,7 @@ def predictor(motion, formula_motion) -> BasePredictor:
     return BasePredictor(model, Manoeuvre(recording, planned, ATTITUDE))
 
 
+@pytest.mark.slow
 def test_the_final_pose_is_that_of_an_independent_simulator(predictor, motion):
     """MuJoCo integrates base position and attitude with the gravity gradient on every body, starting at rest."""
     truth = mj.TruthModel(PLANAR, orbit=ORBIT)
@@ -156,6 +157,7 @@ def plan(tmp_path: Path, motion: mj.Motion) -> Path:
     return tmp_path / "study.toml"
 
 
+@pytest.mark.slow
 def test_simulate_reads_a_plan(plan: Path, tmp_path: Path) -> None:
     """A plan holds the joint motion only; the readings that are written are those of the model, with noise."""
     status, text = run("simulate", plan, "--output", tmp_path / "out")

@@ -117,6 +117,7 @@ def test_resampling_keeps_the_weights(planar_case):
         assert np.floor(weight) <= times <= np.ceil(weight)
 
 
+@pytest.mark.slow
 def test_a_file_of_emcee_is_reachable(planar_case, tmp_path):
     backend = emcee.backends.HDFBackend(str(tmp_path / "steps.h5"), name="flight")
     sampler = bayesid.Emcee(max_steps=10, file=backend)

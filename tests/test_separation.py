@@ -42,6 +42,7 @@ def group(name: str, prior: RivalPrior, scale: int, form: int = 0) -> AmplitudeG
     return AmplitudeGroup(name, 1.0, float(prior.floors[form, scale]), prior.spreads[form, own] ** 2)
 
 
+@pytest.mark.slow
 def test_the_evidence_is_that_of_a_diagnosis():
     rng = np.random.default_rng(3)
     signals = columns(rng)
@@ -230,6 +231,7 @@ def test_a_payload_is_weighed_in_the_moments_in_which_it_is_linear():
     assert np.diag(shown[0]).max() > 1.0
 
 
+@pytest.mark.slow
 def test_a_payload_is_weighed_while_a_search_is_traced():
     own = plan(effects=(Steady(), Payload("part").attach(plan().model.robot)), unknown=False)
     criterion = Separation(("steady", "payload:part"))

@@ -97,6 +97,7 @@ def test_derivatives_are_far_better_than_differences_of_the_samples():
     assert sd[2] < 0.4 * SIGMA * np.sqrt(6.0) / 0.25  # of second differences
 
 
+@pytest.mark.slow
 def test_covariance_between_times_is_that_of_the_errors():
     """Correlation of velocity errors one sample apart, over many noises of one motion; 5 standard errors."""
     time, runs, at = np.arange(0.0, 30.01, 0.5), 120, 30
@@ -243,6 +244,7 @@ def test_equal_readings_are_a_joint_at_rest_beside_others_that_move():
     assert np.abs(moved.evaluate(time)[1] - 0.02 * np.cos(0.2 * time)).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_steps_of_very_different_roughness_do_not_spoil_the_states():
     """ETS-VII's flight, recorded with one noise of many: repeated solutions with the inexact factor diverge."""
     rng = np.random.default_rng(np.random.SeedSequence(3, spawn_key=(4,)))

@@ -24,6 +24,7 @@ def test_chains_of_any_length_are_the_same_arm() -> None:
     np.testing.assert_allclose(short.mass, long.mass)
 
 
+@pytest.mark.slow
 def test_an_evaluation_is_timed() -> None:
     posterior = posterior_of(chain(3), interval=2.0)
     assert 0.0 < seconds_per_evaluation(posterior, repeats=1) < 1.0
@@ -48,6 +49,7 @@ def measured(evaluation: float) -> Benchmark:
     )
 
 
+@pytest.mark.slow
 def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
     runs = [measured(evaluation) for evaluation in (1e-4, 2e-4, 1.5e-4, 1.2e-4, 1.8e-4)]
     values = {name: list(found) for _, figures in figures_by_goal(runs) for name, found, _, _ in figures}

@@ -25,6 +25,7 @@ SCALES = np.geomspace(1e-3, 1e3, 10)
 COVARIANCE = np.outer(SCALES, SCALES) * (FACTOR @ FACTOR.T)
 
 
+@pytest.mark.slow
 def test_the_printed_optimum_is_made_smaller_until_it_keeps_the_rule():
     own = paper_problem()
     parameters, part = shrunk(own, paper.EXCITATION)

@@ -39,6 +39,7 @@ def test_faults_around_a_run_get_one_clear_error(title):
     assert found["refused"], found["said"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("slip", "unit"), [("rate in arcseconds per second", "arcsec/s"), ("acceleration in g", "g")])
 def test_a_wrong_unit_is_refused_with_the_unit_that_it_is(slip, unit):
     """Rates that nothing can follow, which a simulation must not try."""

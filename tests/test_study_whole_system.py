@@ -35,6 +35,7 @@ def test_drawings_are_such_that_the_truth_is_a_draw_of_their_prior():
     assert np.std(z) == pytest.approx(1.0, abs=0.13)
 
 
+@pytest.mark.slow
 def test_regressors_without_torques_know_the_prior_and_the_number_of_samples(flown):
     """A right side of zero knows nothing of the scale s of the masses; P (s - 1)^2 + n s^2 is least at P / (P + n).
 

@@ -93,6 +93,7 @@ def test_gravity_gradient_shows_in_the_torques(formula_motion):
     assert np.abs(miss).max() > 1e-4  # of which the first test leaves less than 1e-6
 
 
+@pytest.mark.slow
 def test_unknown_bodies_and_a_changed_link_carry_their_torques(formula_motion):
     """Two links as unknowns at values off the prior's centre, a third changed by an effect."""
     urdf = ROBOTS["ets7"]
@@ -165,6 +166,7 @@ def test_friction_and_bias_add_to_the_reading(formula_motion):
     np.testing.assert_allclose(added[:, [1, 3, 4, 5]], 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_simulated_torques_have_the_declared_noise(formula_motion):
     urdf = ROBOTS["ets7"]
     motion, truth = flown(urdf)
@@ -178,6 +180,7 @@ def test_simulated_torques_have_the_declared_noise(formula_motion):
     assert chi2 < 1e-10
 
 
+@pytest.mark.slow
 def test_bad_torque_sensors_are_refused(formula_motion):
     urdf = ROBOTS["ets7"]
     motion, truth = flown(urdf)

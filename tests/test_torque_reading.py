@@ -122,6 +122,7 @@ def test_torques_are_read_where_the_study_knows_every_candidate(flown, friction)
     assert found.verdict.status is Status.ADEQUATE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "verdict",
     [ProbableVerdict(Status.UNKNOWN), ProbableVerdict(Status.AMBIGUOUS, ("rate-bias",), {}, (("unknown",),))],
@@ -134,6 +135,7 @@ def test_torques_are_not_read_beside_a_motion_that_may_hold_something_without_a_
     assert "no name" in found.reason
 
 
+@pytest.mark.slow
 def test_a_diagnosis_reads_the_torques_beside_its_verdict(flown, friction):
     found = diagnose(*flown(12, friction), effects=[WheelMomentum()])
     assert found.verdict.status is Status.ADEQUATE

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import jax
 import numpy as np
+import pytest
 
 from bayesid import BodyPrior, InertialParameters, Manoeuvre, Model, Recording, Robot, Wheel
 from bayesid.inference.data import grids_of
@@ -45,6 +46,7 @@ class OneError(WheelMotion):
         return covariance
 
 
+@pytest.mark.slow
 def test_what_a_wrong_speed_changes_by_and_by_is_what_mujoco_says(tmp_path, formula_motion):
     """The wheels hold much momentum, so that the turn of the base soon counts more than the speed itself."""
     urdf = tmp_path / "satellite.urdf"
