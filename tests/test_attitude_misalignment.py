@@ -41,7 +41,8 @@ def test_it_occurs_only_where_an_attitude_is_measured():
     assert AttitudeMisalignment.instances(Model(robot, (rate, Sensor(SensorKind.ATTITUDE, White(SIGMA))), ()))
 
 
-@pytest.mark.parametrize("attitude_sigma", [pytest.param(0.0, marks=pytest.mark.slow), 0.05])
+@pytest.mark.slow
+@pytest.mark.parametrize("attitude_sigma", [0.0, 0.05])
 def test_it_is_found_with_an_exact_and_with_an_unknown_start(attitude_sigma):
     """Three parameters within 16.3 of chi-square (once in 1,000); an unknown start makes it less certain."""
     robot, rng = Robot.from_urdf(SERVICER3), np.random.default_rng(2)

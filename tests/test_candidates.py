@@ -137,6 +137,7 @@ def test_it_joins_the_simulation(result):
     assert np.abs(change[1]).max() > 1.0
 
 
+@pytest.mark.slow
 def test_it_joins_the_tables_of_reports(rows):
     (row,) = candidate_rows([rows["restless-torque"]], 0.01)
     name, probability, _, _, factor, size, power = row

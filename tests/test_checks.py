@@ -66,6 +66,7 @@ def test_a_clean_recording_gives_no_warning(model: Model, recording: Recording) 
     assert abs(rate.delay[0]) < 4.0 * rate.delay[1]
 
 
+@pytest.mark.slow
 def test_a_late_rate_sensor_is_noticed(model: Model, recording: Recording) -> None:
     late = {f"rate__{axis}": np.interp(TIME - 0.3, TIME, recording.channels[f"rate.{axis}"]) for axis in "xyz"}
     rate = check(model, changed(recording, **late)).sensors[0]

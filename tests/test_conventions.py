@@ -27,7 +27,7 @@ from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.recordings import Sensors
 from tests.pdf_text import PdfText
 
-QUICK = ("gyro forward-right-down", "accelerations with gravity")
+QUICK = ("gyro forward-right-down",)
 
 
 @pytest.fixture(scope="module")

@@ -259,7 +259,8 @@ def perturbed_and_fit(tmp_path_factory):
     return perturbed, perturbed.fit()
 
 
-@pytest.mark.parametrize("label", ["aerodynamic-drag", pytest.param("encoder-offset:joint1", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("label", ["aerodynamic-drag", "encoder-offset:joint1"])
 def test_a_push_is_the_effect_in_the_simulation(label, perturbed_and_fit):
     """A push on the model and the effect in the simulation give one residual, to 2 % of what the effect does."""
     perturbed, fit = perturbed_and_fit

@@ -122,7 +122,8 @@ def identified(posterior: Posterior, effect: Effect) -> tuple[np.ndarray, np.nda
     return values, optimum.covariance[-3:, -3:] * 0.01**2, optimum.chi2 / refined.samples
 
 
-@pytest.mark.parametrize("kind", ["constant", pytest.param("creeping", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["constant", "creeping"])
 def test_an_effect_of_ones_own_is_composed_and_identified(kind):
     """Truth: a hidden thrust in MuJoCo, and a torque that grows as 1 - exp(-t / tau) in the reference.
 

@@ -245,7 +245,8 @@ def whole():
     return drawn(LinearGaussian())
 
 
-@pytest.mark.parametrize("calls", [None, 60, *(pytest.param(calls, marks=pytest.mark.slow) for calls in (2, 330))])
+@pytest.mark.slow
+@pytest.mark.parametrize("calls", [None, 60, 2, 330])
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, whole, tmp_path):
     """Interrupted between blocks, or at any evaluation (two per step and ensemble): the same samples bit for bit."""
     file, stub = tmp_path / "chain.h5", LinearGaussian()
@@ -260,7 +261,8 @@ def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, whole, tmp
     assert resumed.effective_samples == whole.effective_samples
 
 
-@pytest.mark.parametrize("calls", [60, pytest.param(330, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("calls", [60, 330])
 def test_an_interrupted_run_stops_where_the_uninterrupted_one_did(calls, tmp_path):
     """Convergence is looked at after the same numbers of steps."""
     goals = {"effective_samples": 3000.0, "max_steps": 3000}

@@ -109,7 +109,8 @@ def ramp(now: float, begin: float, distance: np.ndarray, length: float) -> np.nd
     return np.outer(trapezoid(now - begin, length, 0.2 * length), distance)
 
 
-@pytest.mark.parametrize("move", [quintic, pytest.param(ramp, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("move", [quintic, ramp])
 def test_errors_along_moves_in_a_row_are_covered(move):
     """Moves of 10 to 20 s with pauses of 0 to 3 s, at no times in particular: some 20 to 40 jumps in each joint.
 

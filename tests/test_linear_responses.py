@@ -42,20 +42,18 @@ def by_differences(posterior: Posterior, z: np.ndarray, arrays, push: Perturbati
     return (ends[0] - ends[1]) / (2.0 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
     [
         (),
-        pytest.param(
-            (
-                WheelMomentum(),
-                SensorBias.of(SensorKind.ACCEL)(1e-3),
-                SensorScale.of(SensorKind.RATE)(),
-                SensorLatency.of(SensorKind.ACCEL)(),
-            ),
-            marks=pytest.mark.slow,
+        (
+            WheelMomentum(),
+            SensorBias.of(SensorKind.ACCEL)(1e-3),
+            SensorScale.of(SensorKind.RATE)(),
+            SensorLatency.of(SensorKind.ACCEL)(),
         ),
-        pytest.param((FuelSlosh(), FlexibleAppendage()), marks=pytest.mark.slow),
+        (FuelSlosh(), FlexibleAppendage()),
     ],
     ids=["rigid", "sensors and wheels", "vibrations"],
 )
@@ -90,6 +88,7 @@ def test_each_part_of_a_push_alone_adds_up(planar_posterior: Callable[..., Poste
     assert linear.along(jax.tree.map(lambda x: x[:0], pushes)).shape == (0, *posterior.residual_shape)
 
 
+@pytest.mark.slow
 def test_columns_of_effects_are_derivatives_of_the_simulation_that_has_them(planar_posterior: Callable[..., Posterior]):
     """Of a force, a table of the arm and an error of a sensor that is turned in the base."""
     base = planar_posterior(np.random.default_rng(7), step=0.5)
@@ -114,6 +113,7 @@ def test_columns_of_effects_are_derivatives_of_the_simulation_that_has_them(plan
         assert np.linalg.norm(own - differences) < 1e-3 * np.linalg.norm(differences), name
 
 
+@pytest.mark.slow
 def test_a_fit_ends_where_the_gradient_of_its_cost_vanishes(planar_posterior: Callable[..., Posterior]):
     """Under a prior that is narrower than its error, so that the data and it pull against each other."""
     fit = PerturbedModel(planar_posterior(np.random.default_rng(9), spread=3e-3, step=0.5)).fit()

@@ -110,6 +110,7 @@ def number_of_process(task: int, rng: np.random.Generator) -> int:
     return os.getpid()
 
 
+@pytest.mark.slow
 def test_the_processes_of_a_killed_run_end_with_it(tmp_path):
     store = tmp_path / "trials.jsonl"
     code = f"from tests.test_monte_carlo import *; run_trials(number_of_process, range(999), {str(store)!r}, workers=2)"

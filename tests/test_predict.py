@@ -74,6 +74,7 @@ def test_the_final_pose_is_that_of_an_independent_simulator(predictor, motion):
     np.testing.assert_array_equal(base.position[0, 0], 0.0)
 
 
+@pytest.mark.slow
 def test_the_width_is_that_of_a_linearisation(predictor):
     """A prior of 1 % is nearly linear; 400 draws give a standard deviation to 3.5 %, and four of them."""
     prediction = predictor.predict(400, np.random.default_rng(1))

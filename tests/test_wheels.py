@@ -27,7 +27,7 @@ POINT = (0.2, 0.3, -0.4)
 RATE = np.array([0.004, -0.003, 0.005])
 
 
-@pytest.mark.parametrize("arm", [True, False], ids=["arm", "wheels alone"])
+@pytest.mark.parametrize("arm", [pytest.param(True, marks=pytest.mark.slow), False], ids=["arm", "wheels alone"])
 def test_the_momentum_of_recorded_wheels_agrees_with_rotors_in_mujoco(arm, tmp_path, formula_motion):
     """Rotors are bodies of MuJoCo; what is left is the interpolation of speeds that are sampled at 5 Hz."""
     urdf, mounted = ARM, wheels.pyramid(inertia=0.02)[:2]
