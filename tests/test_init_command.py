@@ -194,7 +194,7 @@ def noisy_rate(files: list[Path]) -> None:
             ("no position or velocity for joint joint2", "joint wrist is not"),
         ),
         (without_base_sensors, ("no sensor of the base is in all recordings", "manoeuvre-1")),
-        (in_degrees, ("outside the joint's limits", "radians, not degrees")),
+        (in_degrees, ("outside the joint's limits", "in degrees, give them in radians")),
         (noisy_rate, ("sensors.rate.sigma", "implausibly large", "rad/s")),
         (lambda files: files[0].unlink(), ("no such file", "robot.urdf")),
         (lambda files: files[1].unlink(), ("no such file", "manoeuvre-1.csv")),

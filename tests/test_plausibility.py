@@ -46,7 +46,9 @@ def test_a_limited_joint_that_jumps_by_a_turn_is_refused():
         unwrapped(flown(wrapped), LIMITED)
 
 
-@pytest.mark.parametrize(("count", "words"), [(1, "1 of 600 samples are corrupted"), (200, "radians, not degrees")])
+@pytest.mark.parametrize(
+    ("count", "words"), [(1, "1 of 600 samples are corrupted"), (200, "in degrees, give them in radians")]
+)
 def test_a_garbled_reading_is_told_from_a_wrong_unit(count, words):
     angle = 0.1 * np.sin(0.1 * TIME)
     angle[100 : 100 + count] = 57.0
