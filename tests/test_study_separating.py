@@ -89,6 +89,21 @@ def test_a_payload_and_an_error_change_the_bodies_as_stated():
     assert wrong.link(HAND) == robot.link(HAND)
 
 
+def test_the_change_of_an_error_is_predicted_whole_and_not_to_first_order():
+    """Moments are exponential in the first coordinate, which scales them all: 0.1 of it by exp(0.2)."""
+    robot = mission.published_robot()
+    coordinates = np.stack([ERROR.amplitudes, ERROR.turned(np.random.default_rng(1))])
+    step = 1e-4
+
+    def moments(amplitudes: np.ndarray) -> np.ndarray:
+        return ERROR.hide(amplitudes, robot)[0].link(LINK).inertial.vector
+
+    derivatives = np.stack([(moments(row) - moments(-row)) / (2.0 * step) for row in step * np.eye(10)])
+    for truth, linear in zip(coordinates, ERROR.linear(coordinates), strict=True):
+        whole = moments(truth) - robot.link(LINK).inertial.vector
+        np.testing.assert_allclose(linear @ derivatives, whole, rtol=1e-5, atol=1e-6 * np.abs(whole).max())
+
+
 @pytest.mark.parametrize("pair", PAIRS.values(), ids=PAIRS)
 def test_random_directions_have_the_stated_size(pair):
     rng = np.random.default_rng(3)

@@ -278,9 +278,10 @@ def predictions(pair: Pair, weighing: Weighing, known: Mapping[str, Reference], 
     rng = np.random.default_rng(seed)
     predicted: dict[Case, DecisionRate] = {}
     for direction in DIRECTIONS:
+        drawn = [np.array([_amplitudes(cause, direction, rng) for _ in range(PREDICTED)]) for cause in pair.causes]
         amplitudes = [
-            weighing.relative(cause.label, np.array([_amplitudes(cause, direction, rng) for _ in range(PREDICTED)]))
-            for cause in pair.causes
+            weighing.relative(cause.label, cause.linear(values))
+            for cause, values in zip(pair.causes, drawn, strict=True)
         ]
         for stage, names in STAGES.items():
             rates = weighing.predict(joined(single, names), amplitudes, rng)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -13,7 +15,7 @@ from bayesid import Effect, Robot
 from bayesid._math.arrays import Floats
 from bayesid._math.double_precision import in_double_precision
 from bayesid.robot.inertial_parameters import InertialParameters
-from bayesid.robot.log_cholesky import log_cholesky_vector
+from bayesid.robot.log_cholesky import log_cholesky_vector, vector_from_factor
 from bayesid.simulation.effects import LinkInertia, MagneticDipole, Payload, ThrusterLeak, ThrusterPulses, WheelMomentum
 from studies.common.flight import ORBIT, light_wheel
 from studies.truth.mujoco import leak, magnet, pulses
@@ -37,6 +39,8 @@ class Cause:
     amplitudes: Floats  # (k,): amplitudes of the effect in SI units
     turned: Callable[[np.random.Generator], Floats]  # amplitudes of the same size in a random direction, (k,)
     hide: Callable[[Floats, Robot], Hidden]  # amplitudes and the robot without it -> what flies
+    # amplitudes, (n, k) -> those whose effect of first order is the whole effect of the given ones
+    linear: Callable[[Floats], Floats] = lambda amplitudes: amplitudes
 
     @property
     def label(self) -> str:
@@ -99,6 +103,18 @@ def _with_error(amplitudes: Floats, robot: Robot) -> Hidden:
     return robot.with_inertial(LINK, InertialParameters.from_vector(vector)), {}
 
 
+@in_double_precision
+def _first_order(coordinates: Floats) -> Floats:
+    """Return log-Cholesky coordinates that to first order change a body's moments by what the given ones do, (n, 10).
+
+    The change of the pseudo-inertia is linear in its value for a body whose factor is one, so the answer holds for all.
+    """
+    moments = partial(vector_from_factor, jnp.eye(4))
+    none = jnp.zeros(coordinates.shape[-1])
+    changes = jax.vmap(moments)(jnp.asarray(coordinates)) - moments(none)
+    return np.asarray(jnp.linalg.solve(jax.jacfwd(moments)(none), changes.T).T)
+
+
 WHEEL = _vector(
     WheelMomentum(), "wheel momentum", "wheels with −0.6, 0.35, 0.7 N m s", (-0.6, 0.35, 0.7),
     lambda vector: {"rotor": light_wheel(vector)},
@@ -122,7 +138,7 @@ PAYLOAD = Cause(
 )  # fmt: skip
 ERROR = Cause(
     LinkInertia(LINK), "link error", "link 3 with an error of 0.1 in a coordinate of its inertia",
-    0.1 * np.eye(10)[0], lambda rng: 0.1 * _direction(rng, 10), _with_error,
+    0.1 * np.eye(10)[0], lambda rng: 0.1 * _direction(rng, 10), _with_error, _first_order,
 )  # fmt: skip
 
 PAIRS: Mapping[str, Pair] = {
