@@ -272,7 +272,7 @@ def factor_figure(result: PairResult) -> Figure:
             text = f"{format_percent(rate)}\npredicted {format_percent(predicted)}"
             axes.annotate(text, (number, 1.0), xycoords=("data", "axes fraction"), ha="center", va="top")
         axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in analysis.STAGES])
-        title = fill(f"hidden: {result.pair.cause(realised.label).words}", 40)
+        title = fill(f"hidden: {result.pair.cause(realised.label).words}", 46)
         axes.set(title=title, xlim=(-0.5, place[-1] + 0.5))
         axes.set_yscale("symlog", linthresh=1.0)
         axes.set_ylim(top=20.0 * max(1.0, float(values.max())))
