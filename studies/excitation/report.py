@@ -237,9 +237,9 @@ def _report(result: Result) -> Report[Result]:
         subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within its flight rule, is most informative about its base?",
         answer="Compared with the best condition number, the d-optimal manoeuvre reduces the base's standard "
-        f"deviations by a factor of {factors[HEADLINE]:.2f}. This is the factor of their geometric mean, "
-        f"{ARMS[HEADLINE]}; {ARMS[IDEAL]}, it is {factors[IDEAL]:.2f}. The standard deviation of the mass alone, which "
-        f"is limited by the arm, falls by a factor of {_of_mass(contest):.2f}; {_starts(result)}.",
+        f"deviations by a factor of {factors[HEADLINE]:.2f}. This is the factor of their geometric mean with an "
+        f"{ARMS[HEADLINE]}; with the {ARMS[IDEAL]} it is {factors[IDEAL]:.2f}. The standard deviation of the mass "
+        f"alone, which is limited by the arm, falls by a factor of {_of_mass(contest):.2f}; {_starts(result)}.",
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and stay "
         "within 50 mm/s and 5 degrees per second at the tip; the base is initially at rest and only the gravity "
         "gradient acts.",
@@ -355,7 +355,7 @@ def _evidence(document: Document, result: Result) -> None:
         "satisfies the rule, against (26) in both readings and against the sum of the squared largest excursions, "
         "added in SI units without weights.",
     )
-    drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
+    drawn = {TITLES[name].removeprefix("best by "): contest.motions[name] for name in DRAWN if name in contest.motions}
     document.figure(
         manoeuvre_figure(drawn), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
     )
@@ -505,7 +505,7 @@ def _crowd_figure(result: Result) -> Figure:
 @styled
 def _cloud_figure(result: Result) -> Figure:
     cloud = result.cloud
-    figure = wide_figure(1.65)
+    figure = wide_figure(1.8)
     titles = ("Eq. (26) as printed", "Eq. (26), corrected", "sum of squared excursions")
     panels = figure.subplots(1, 3, sharey=True)
     units = ("", "", " m², rad²")
@@ -513,7 +513,7 @@ def _cloud_figure(result: Result) -> Figure:
     for axes, title, unit, values in zip(panels, titles, units, clouds, strict=True):
         axes.plot(1e3 * values, cloud.information, ".", color=COLOURS[0], markersize=3)
         axes.set_title(f"rank correlation {format_fixed(cloud.correlation(values)[0], 2)}")
-        axes.set_xlabel(f"{title} [10⁻³{unit}]")
+        axes.set_xlabel(f"{title}\n[10⁻³{unit}]")
     panels[0].set_ylabel("information [nats]")
     return figure
 
