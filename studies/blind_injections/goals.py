@@ -11,7 +11,7 @@ from scipy import stats
 
 from bayesid._io.words import counted
 from bayesid.diagnosis import Status
-from bayesid.report.numbers import NO_VALUE
+from bayesid.report.numbers import NO_VALUE, format_number, format_p_value
 from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import CASES, EXPLAINING, Trial
 from studies.common.study import Goal, Severity, Verdict
@@ -129,10 +129,10 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
     for low, high in pairwise(DECADES):
         within = [(p, holds) for p, holds in named if p is not None and low <= p and (p < high or high == 1.0)]
         stated, wrong = sum(1.0 - p for p, _ in within), sum(not holds for _, holds in within)
-        parts.append(f"{low:g} to {high:g}: {wrong} of {len(within)}, {stated:.2g} expected")
+        parts.append(f"{low:g} to {high:g}: {wrong} of {len(within)}, {format_number(stated, 2)} expected")
         chances.append(float(stats.poisson.sf(wrong - 1, stated)))
     verdict = Verdict.FAIL if min(chances) < CHANCE / len(chances) else Verdict.PASS
-    least = f"smallest one-sided p {min(chances):.2g}, FAIL below {CHANCE / len(chances):.2g}"
+    least = f"smallest one-sided p {format_p_value(min(chances))}, FAIL below {CHANCE / len(chances):.2g}"
     return Goal(text, f"{'; '.join(parts)}; {least}", verdict, Severity.HIGH)
 
 
