@@ -47,6 +47,8 @@ class CatalogueEntry:
         Largest plausible sizes, with reasons; up to these a diagnosis takes every power of ten as equally probable.
     needs : tuple of str
         What a study must contain for the effect to exist or to be visible.
+    names : tuple of str
+        Names of the parameters, and of the quantities as which they are reported.
     """
 
     name: str
@@ -55,6 +57,7 @@ class CatalogueEntry:
     parameters: tuple[str, ...] = ()
     sizes: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         blocks = [
@@ -116,6 +119,7 @@ def _entry(kind: type[Effect], model: Model) -> CatalogueEntry:
         parameters=() if effect is None else _parameters(effect),
         sizes=() if effect is None else _sizes(effect, model if kind.instances(model) else _example_with(kind)),
         needs=_needs(kind),
+        names=() if effect is None else _known_by(effect),
     )
 
 
@@ -150,6 +154,11 @@ def _parameters(effect: Effect) -> tuple[str, ...]:
         parts = [f"{_names([quantity.name for quantity in group])} [{_unit(unit)}]" for unit, group in alike]
         lines.append(f"reported as {', '.join(parts)}")
     return tuple(lines)
+
+
+def _known_by(effect: Effect) -> tuple[str, ...]:
+    reported = (quantity.name for quantity in effect.quantities)
+    return tuple(dict.fromkeys([*(parameter.name for parameter in effect.parameters), *reported]))
 
 
 def _group(group: Sequence[Parameter]) -> str:

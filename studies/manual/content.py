@@ -181,8 +181,10 @@ def _plural(value: Mapping[str, Any]) -> str:
 
 def _effect(entry: CatalogueEntry) -> dict[str, Any]:
     kind = known_effects().get(entry.name.partition(":")[0])
+    printed = set(re.findall(r"[\w.]+", " ".join(entry.parameters)))
     return {
         "name": entry.name,
+        "names": sorted({name.partition(".")[0] for name in entry.names if name in printed}),  # vectors as one
         "summary": _pieces(entry.summary),
         "notes": [] if kind is None else _paragraphs(kind),
         "separated_by": _pieces(entry.separated_by),
