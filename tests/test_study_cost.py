@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from bayesid import InputError
 from studies.common.study import Severity, Verdict
 from studies.cost.report import STUDY, goals_of
-from studies.cost.run import Cost, Floor, Nested, Run, run, run_command
+from studies.cost.run import Cost, Floor, Nested, Run, Timed, run, run_command, stored_in
 from studies.cost.search_times import SearchTimes
 from tests.conftest import QUICKLY
 from tests.pdf_text import PdfText
@@ -124,6 +126,36 @@ def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text("title = 1\n")
     with pytest.raises(RuntimeError, match=r"check of .*study\.toml failed: .*title"):
         run_command(("check",), tmp_path / "study.toml", tmp_path / "out", tmp_path / "cache")
+
+
+def test_an_interrupted_study_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def fly(words: Sequence[str], study: Path, output: Path, cache: Path) -> Run:
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        output.mkdir()
+        cache.mkdir(exist_ok=True)
+        made.append(len(list(cache.iterdir())))
+        (cache / f"compiled-{len(made)}").touch()
+        return timed(float(len(made)))
+
+    monkeypatch.setattr("studies.cost.run.run_command", fly)
+    said: list[str] = []
+    place = stored_in(tmp_path / "runs")
+    wanted = ("leak", ("diagnose",), tmp_path / "study.toml", 3, place / "cache-leak")
+    (place / "cache-leak").mkdir()
+    (place / "cache-leak" / "of a run that was cut off").touch()
+    with pytest.raises(KeyboardInterrupt):
+        Timed(place, said.append).runs(*wanted)
+    (place / "out-leak-2").mkdir()
+    monkeypatch.setattr("studies.cost.run.run_command", lambda *_: timed(3.0))
+    assert Timed(stored_in(place), said.append).runs(*wanted) == [timed(1.0), timed(2.0), timed(3.0)]
+    assert made == [0, 1]
+    assert said == ["leak, cold", "leak, warm", "leak, warm", "leak, warm"]
+    monkeypatch.setattr("studies.cost.run.fingerprint", lambda study: "other")
+    with pytest.raises(InputError, match="made by other code"):
+        stored_in(place)
 
 
 @pytest.mark.slow

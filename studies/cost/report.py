@@ -307,6 +307,9 @@ STUDY = Study(
     report=_report,
     full="repeat every run, draw samples, and run a nested sampler for up to ten minutes",
     seed=0,
-    extra={"--before": {"type": Path, "help": "CSV file with the times of an earlier run, for comparison"}},
+    extra={
+        "--before": {"type": Path, "help": "CSV file with the times of an earlier run, for comparison"},
+        "--runs": {"type": Path, "help": "folder that stores the timed runs, to resume an interrupted study"},
+    },
     inputs=lambda options: [MODELS / "ets7.urdf", *([] if options.before is None else [options.before])],
 )

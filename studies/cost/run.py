@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,12 +19,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bayesid import BodyPrior, Manoeuvre, Model, Posterior
+from bayesid import BodyPrior, InputError, Manoeuvre, Model, Posterior
+from bayesid._io.files import write_json
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.inference import choose_parameterisation, compiled, maximise
 from studies.benchmark.run import best_of, chain, posterior_of, seconds_per_evaluation
+from studies.common.code_version import fingerprint
 from studies.common.ets7 import ets7
 from studies.common.provenance import MODELS
 from studies.cost.search_times import SearchTimes, search_times
@@ -173,6 +176,27 @@ def run_command(words: Sequence[str], study: Path, output: Path, cache: Path) ->
             phases = json.loads((output / name).read_text(encoding="utf-8"))["seconds"]
             phases = {"start": max(wall - sum(phases.values()), 0.0), **phases}
     return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2.0**20, phases)
+
+
+class Timed(NamedTuple):
+    """Commands that are timed once, whose runs a folder stores."""
+
+    place: Path  # of results and runs
+    progress: Callable[[str], None]  # receives a line before each run
+
+    def runs(self, name: str, words: Sequence[str], study: Path, count: int, cache: Path) -> list[Run]:
+        """Return so many runs of a command, those that are stored and new ones; see `run_command`."""
+        made = []
+        for number in range(count):
+            output, record = self.place / f"out-{name}-{number}", self.place / f"run-{name}-{number}.json"
+            if not record.is_file():
+                if number == 0 and cache.name == f"cache-{name}":
+                    shutil.rmtree(cache, ignore_errors=True)  # what an interrupted run compiled
+                shutil.rmtree(output, ignore_errors=True)
+                self.progress(f"{name}, {'warm' if cache.is_dir() else 'cold'}")
+                write_json(record, run_command(words, study, output, cache)._asdict())
+            made.append(Run(**json.loads(record.read_text(encoding="utf-8"))))
+        return made
 
 
 MATRIX, VECTOR = 1500, 30_000_000  # sizes of the matrix product and of the sum that measure what the machine can do
@@ -337,6 +361,7 @@ def run(
     commands: tuple[str, ...] = tuple(COMMANDS),
     large: tuple[Large, ...] = LARGE,
     before: Path | None = None,
+    runs: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Cost:
     """Measure everything.
@@ -348,29 +373,30 @@ def run(
     titles, commands : tuple of str; diagnoses and other commands to time
     large : tuple of Large; runs on much data, which only a full study makes
     before : Path, optional; times that an earlier run wrote, to compare with
+    runs : Path, optional; folder that stores the runs of commands and their compiled code, to resume an interrupted
+        study
     progress : callable, optional; receives a line before each part
+
+    Raises
+    ------
+    InputError
+        If other code made the stored runs.
     """
     repeats = REPEATS if full else 1
     with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
+        place = stored_in(runs) if runs else Path(folder)
         chosen = [case for case in DIAGNOSES if case.title in titles]
         files = {case.title: write_case(case.case, place / f"study-{k}") for k, case in enumerate(chosen)}
 
-        def timed(name: str, words: tuple[str, ...], file: Path, count: int, cache: Path) -> list[Run]:
-            runs = []
-            for number in range(count):
-                progress(f"{name}, {'cold' if not any(cache.glob('*')) else 'warm'}")
-                runs.append(run_command(words, file, place / f"out-{name}-{number}", cache))
-            return runs
-
+        timed = Timed(place, progress).runs
         diagnoses, sampled = {}, {}
         for case in chosen:
             cache = place / f"cache-{case.title}"
             words = ("diagnose", "--no-sample", "--no-fly-next")
             diagnoses[case.title] = timed(case.title, words, files[case.title], 1 + repeats, cache)
             if full and case.title in SAMPLED:
-                runs = timed(f"{case.title}, samples", ("diagnose", "--no-fly-next"), files[case.title], 2, cache)
-                sampled[case.title] = runs[-1]
+                after = timed(f"{case.title}, samples", ("diagnose", "--no-fly-next"), files[case.title], 2, cache)
+                sampled[case.title] = after[-1]
         others = {
             name: timed(name, (name,), files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
@@ -398,6 +424,17 @@ def run(
     grown = growth(20) if full else growth(2, sizes=1)
     floor = floor_of(20 if full else 2)
     return Cost(diagnoses, sampled, others, on_large, by_candidates, grown, floor, one, search, full, before)
+
+
+def stored_in(runs: Path) -> Path:
+    """Return the folder that stores runs, after noting in it which code makes them."""
+    runs.mkdir(parents=True, exist_ok=True)
+    made_by, numbers = runs / "made_by.json", fingerprint("cost")
+    if not made_by.is_file():
+        write_json(made_by, {"numbers": numbers})
+    if json.loads(made_by.read_text(encoding="utf-8"))["numbers"] != numbers:
+        raise InputError("these runs were made by other code", file=runs, remedy="Choose a new folder")
+    return runs
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:
