@@ -115,9 +115,9 @@ def _report(result: Result) -> Report[Result]:
         title="A load of 370 kg on ETS-VII",
         subtitle="Section 4.2 of Lampariello and Hirzinger (IDETC 2005)",
         question="Does a loop that plans, flies and identifies safely find a load of 370 kg from a guess of 10 kg?",
-        answer=f"From a guess of 10 kg the loop identified {reached} kg (truth: 370 kg) in {len(loop.bodies)} "
-        f"manoeuvres {within}. With the arm known exactly, the same manoeuvres give {ideal} kg: the 5 % uncertainty (1 "
-        "sigma) of each link mass dominates that of the load.",
+        answer=f"The loop identified a load of 370 kg as {reached} kg in {len(loop.bodies)} manoeuvres {within}. It "
+        f"started from a guess of 10 kg. With the arm known exactly, the same manoeuvres give {ideal} kg: the 5 % "
+        "uncertainty (1 sigma) of each link mass dominates that of the load.",
         goals=_goals(result),
         valid="the base is known exactly and rests before each manoeuvre, the load is rigid and rigidly attached, "
         "and only the gravity gradient acts, which the diagnosis of each step had to confirm.",

@@ -249,9 +249,9 @@ def _answer(made: Made) -> str:
             else ""
         )
         parts.append(
-            f"The fastest alternative takes {'at least ' if bounds else ''}"
-            f"{joined([f'{ratio:.1f}' for ratio in ratios.values()])} times as long as the package with "
-            f"{joined(list(map(str, ratios)))} unknowns.{beside}"
+            f"The fastest alternative takes at least {min(ratios.values()):.1f} times as long as the package. With "
+            f"{joined(list(map(str, ratios)))} unknowns it takes {'at least ' if bounds else ''}"
+            f"{joined([f'{ratio:.1f}' for ratio in ratios.values()])} times as long.{beside}"
         )
     errors = [_evidence_error(made, unknowns, Sampler.OURS) for unknowns in CASES]
     known = [error for error in errors if error is not None]
