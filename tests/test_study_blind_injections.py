@@ -205,7 +205,7 @@ def test_false_names_are_compared_with_what_was_stated_decade_by_decade():
     judged = _reliable([right] * 95 + [wrong] * 5 + [sure] * 9 + [mistaken])
     assert judged.verdict is Verdict.FAIL
     assert "0.9 to 0.99: 5 of 100, 5 expected" in judged.reached
-    assert "0.999 to 1: 1 of 10, 0.005 expected" in judged.reached
+    assert "0.999 to 1: 1 of 10, 5 × 10⁻³ expected" in judged.reached
 
 
 def test_one_kind_of_outside_effect_must_not_be_misnamed_however_few_others_are():
