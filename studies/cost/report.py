@@ -143,7 +143,7 @@ def _report(cost: Cost) -> Report[Cost]:
         f"code.{_limits_text(warm)} "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
         goals=goals,
-        valid=f"run on {processor()}, with no other load. The machine's speed varies by a third from day to day.",
+        valid=f"run on {processor()}, with no other load. The machine's speed varies by a factor of two between days.",
         full=cost.full,
         figure=Picture(
             phases_figure(cost),
