@@ -12,7 +12,7 @@ from bayesid import InputError
 from studies.common.study import Severity, Verdict
 from studies.cost.report import STUDY, goals_of
 from studies.cost.run import Cost, Floor, Nested, Run, Timed, run, run_command, stored_in
-from studies.cost.search_times import SearchTimes
+from studies.cost.search_times import SearchTimes, search_times
 from tests.conftest import QUICKLY
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
@@ -171,3 +171,18 @@ def test_a_small_study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert cost.search is None
     STUDY.write(cost, tmp_path / "cost.pdf")
     assert broken_rules(tmp_path / "cost.pdf", full=False) == []
+
+
+def test_a_search_begins_without_compiled_code_however_often_it_is_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A resumed study stores what commands compile; a cold start must not find any of it."""
+    found = []
+
+    def clock(cache: Path, *, one_core: bool) -> dict:
+        found.append(len(list(cache.iterdir())))
+        (cache / f"compiled-{len(found)}").touch()
+        return {"ready": 2.0 - (len(found) > 1), "criterion": [0.02], "limits": [0.01], "unknowns": 48}
+
+    monkeypatch.setattr("studies.cost.search_times.search_clock", clock)
+    times = search_times(), search_times()
+    assert found == [0, 1, 2, 0, 1, 2]
+    assert (times[0].cold, times[0].warm) == (2.0, 1.0)

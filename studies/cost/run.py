@@ -412,7 +412,7 @@ def run(
                 progress(str(refusal))
                 on_large[row.title] = []
         progress("search for manoeuvres")
-        search = search_times(place / "cache-search") if full else None
+        search = search_times() if full else None
         progress("candidates and nested sampling")
         study = Study.load(files[chosen[-1 if len(chosen) < 2 else 1].title])
         model = load_model(study)

@@ -10,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -29,11 +30,13 @@ class SearchTimes(NamedTuple):
     unknowns: int  # number of free numbers of a manoeuvre
 
 
-def search_times(cache: Path) -> SearchTimes:
-    """Measure a search; the folder of compiled code must be empty or absent."""
-    cold = search_clock(cache, one_core=False)
-    warm = search_clock(cache, one_core=False)
-    step = search_clock(cache, one_core=True)
+def search_times() -> SearchTimes:
+    """Measure a search, without compiled code and then with what that compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        cache = Path(folder)
+        cold = search_clock(cache, one_core=False)
+        warm = search_clock(cache, one_core=False)
+        step = search_clock(cache, one_core=True)
     return SearchTimes(cold["ready"], warm["ready"], tuple(step["criterion"]), tuple(step["limits"]), step["unknowns"])
 
 
