@@ -62,20 +62,18 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     goals = goals_of(cost)
     verdicts = {goal.text.partition(":")[0] + f" {goal.reached[:3]}": goal.verdict for goal in goals}
     by_text = [goal.verdict for goal in goals]
-    # warm 5 s (payload takes 8.8 s) and 10 s, cold 20 s (20.8 s) and 40 s, memory, samples, identify, design,
+    # warm 5 s (payload takes 8.8 s) and 10 s, cold 20 s (20.8 s) and 40 s, memory, samples, identify and design,
     # much data, start of a search
     assert by_text == [
         Verdict.FAIL,
-        Verdict.PASS,
         Verdict.FAIL,
         Verdict.PASS,
         Verdict.PASS,
-        Verdict.OPEN,
         Verdict.FAIL,
         Verdict.FAIL,  # 2.4 GB
         Verdict.PASS,
     ], verdicts
-    assert goals[2].text.endswith("at most 40 s for wheel and bias, growing torque, oscillating torque")
+    assert goals[1].text.endswith("at most 40 s for wheel and bias, growing torque, oscillating torque")
     assert goals[-2].reached == "9 s, 0.5 GB; 35 s, 2.4 GB"
     within = replace(cost, large={**cost.large, "diagnose, 40 recordings": [timed(60.0), timed(30.0, memory=1.9)]})
     assert goals_of(within)[-2].verdict is Verdict.PASS
@@ -84,7 +82,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that bound" in text  # 200 µs over 6e5 operations at 3e10 a second
     assert "The limit of 5 s (nothing hidden, leak, payload and link error) is missed in 2 of 4 cases." in text
-    assert "4 of 9 goals are missed" in text
+    assert "4 of 7 goals are missed" in text
     assert "each of 46 candidates would take more than 1000 times as long" in text  # 100 s for each over 4.6 s
     assert "takes 31.0 ms on one core" in text
     assert "The files of check, identify and design state no time by phase" in text

@@ -106,7 +106,9 @@ def test_differences_from_the_stated_moments_are_decided_by_their_scatter(error,
     body = BodyResult("Empty", ("1", "2", "3"), moments, *[np.ones(3)] * 6)
     assert body.mean_error == pytest.approx(error)
     assert body.mean_error_sd == pytest.approx(scatter / np.sqrt(3.0))
-    assert _quick_fit(body).verdict is verdict
+    assert _quick_fit([body]).verdict is verdict
+    precise = BodyResult("A", ("1", "2"), np.full((2, 3), 1.02), *[np.ones(3)] * 6)
+    assert _quick_fit([body, precise]).verdict is Verdict.FAIL
 
 
 def test_absent_measurements_are_named(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +28,7 @@ CHANGED = 0.1  # relative change of a time beside an earlier run from which it i
 
 def goals_of(cost: Cost) -> list[Goal]:
     """Return every goal with what was reached."""
-    warm = sorted({case.warm for case in DIAGNOSES})
-    goals = [_times(cost, "warm", [limit]) for limit in warm] + [
-        _times(cost, "cold", {case.cold for case in DIAGNOSES})
-    ]
+    goals = [_times(cost, code) for code in ("warm", "cold")]
     memory = {name: max(run.memory for run in runs) for name, runs in cost.diagnoses.items()}
     worst = max(memory, key=lambda name: memory[name])
     sampled = {name: run.phases["sample"] for name, run in cost.sampled.items()}
@@ -49,20 +46,28 @@ def goals_of(cost: Cost) -> list[Goal]:
             Severity.LOW,
         ),
     ]
-    for name, limit in COMMANDS.items():
-        if limit is not None and name in cost.commands:
-            walls = [run.wall for run in cost.commands[name][1:]]
-            text = f"{name}, files to report, with cached compiled code: at most {limit:g} s"
-            verdict = Verdict.between(min(walls), max(walls), most=limit)
-            goals.append(Goal(text, _spread(walls), verdict, Severity.LOW))
-    return [goal for goal in (*goals, _large_goal(cost.large), _search_goal(cost.search)) if goal is not None]
+    goals += [_command_goal(cost.commands), _large_goal(cost.large), _search_goal(cost.search)]
+    return [goal for goal in goals if goal is not None]
 
 
-def _times(cost: Cost, code: str, limits: Collection[float]) -> Goal | None:
-    """Return the goal on the time to the verdict, with limits of one or more groups of diagnoses; None without any."""
+def _command_goal(commands: Mapping[str, list[Run]]) -> Goal | None:
+    """Return the goal on the time of other commands; None where none was run."""
+    limits = {name: limit for name, limit in COMMANDS.items() if limit is not None and name in commands}
+    walls = {name: [run.wall for run in commands[name][1:]] for name in limits}
+    if not walls:
+        return None
+    text = "Files to report, with cached compiled code, at most: "
+    text += ", ".join(f"{name} {limit:g} s" for name, limit in limits.items())
+    told = ", ".join(f"{name} {_spread(each)}" for name, each in walls.items())
+    verdicts = [Verdict.between(min(each), max(each), most=limits[name]) for name, each in walls.items()]
+    return Goal(text, told, Verdict.all_of(verdicts), Severity.LOW)
+
+
+def _times(cost: Cost, code: str) -> Goal | None:
+    """Return the goal on the time to the verdict, with the limit of each group of diagnoses; None without any."""
     part = slice(0, 1) if code == "cold" else slice(1, None)
     texts, told, verdicts = [], [], []
-    for limit in sorted(limits):
+    for limit in sorted({getattr(case, code) for case in DIAGNOSES}):
         wanted = [case.title for case in DIAGNOSES if case.title in cost.diagnoses and getattr(case, code) == limit]
         each = {name: [run.to_verdict for run in cost.diagnoses[name][part]] for name in wanted}
         if each:

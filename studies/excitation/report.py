@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.design import THOROUGH, Search, Store
 from bayesid.report import Document
@@ -76,15 +77,12 @@ def goals(result: Result) -> tuple[Goal, ...]:
     finer = "on a grid eight times finer than the search's"
     starts = f"{STARTS} starts"
     return (
-        *(
-            Goal(
-                f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, "
-                f"{ARMS[row]}",
-                f"{factor:.2f} times",
-                Verdict.of(factor >= WANTED),
-                Severity.MEDIUM,
-            )
-            for row, factor in factors.items()
+        Goal(
+            f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, "
+            f"{joined(ARMS[row] for row in factors)}",
+            joined(f"{factor:.2f}" for factor in factors.values()) + " times",
+            Verdict.of(min(factors.values()) >= WANTED),
+            Severity.MEDIUM,
         ),
         _largest_goal(starts, result),
         _robots_goal(starts, result),

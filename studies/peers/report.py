@@ -24,7 +24,6 @@ from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, Re
 from studies.peers.density import CASES
 from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
 
-MODERATE = 39  # number of unknowns up to which the goal on time is one
 FASTER = 5.0  # smallest wanted ratio of the best peer's time to the package's
 EVIDENCE = 0.1  # largest wanted error of the log evidence
 
@@ -152,20 +151,16 @@ def _density(document: Document, made: Made) -> None:
 
 
 def goals_of(made: Made) -> list[Goal]:
-    """Return the goals: speed by number of unknowns, evidence, and those of the task."""
-    few = [unknowns for unknowns in sorted(CASES) if unknowns <= MODERATE]
-    many = [unknowns for unknowns in sorted(CASES) if unknowns > MODERATE]
-    return [_speed_goal(made, few), _speed_goal(made, many), _evidence_goal(made), *_task_goals(made)]
+    """Return the goals: speed, evidence, and that of the task."""
+    return [_speed_goal(made), _evidence_goal(made), _task_goal(made)]
 
 
-def _speed_goal(made: Made, sizes: Sequence[int]) -> Goal:
-    """Return the goal on the times with some numbers of unknowns; the worst decides."""
+def _speed_goal(made: Made) -> Goal:
+    """Return the goal on the times with all numbers of unknowns; the worst decides."""
+    sizes = sorted(CASES)
     text = f"at least {FASTER:g} times faster than the best peer, {joined(map(str, sizes))} unknowns"
     parts = {unknowns: _speed(made, unknowns) for unknowns in sizes}
-    several = len(sizes) > 1
-    reached = "; ".join(
-        f"{unknowns} unknowns: {said.replace('; ', ', ')}" if several else said for unknowns, (said, _) in parts.items()
-    )
+    reached = "; ".join(f"{unknowns} unknowns: {said.replace('; ', ', ')}" for unknowns, (said, _) in parts.items())
     verdict = Verdict.all_of(part for _, part in parts.values())
     return Goal(text, "not run" if verdict is Verdict.NOT_TESTED else reached, verdict, Severity.LOW)
 
@@ -216,21 +211,21 @@ def _fastest(package: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, An
     return f"{estimates[best]:.1f} ({best}){beside}"
 
 
-def _task_goals(made: Made) -> list[Goal]:
-    goals = []
-    for hidden, words in ((False, "nothing hidden"), (True, "hidden wheel momentum")):
-        text = f"stated 95 % intervals contain the truth in 95 % of cases, {words}"
+def _task_goal(made: Made) -> Goal:
+    told, verdicts = [], []
+    for hidden, words in ((False, "nothing hidden"), (True, "wheel momentum")):
         errors = _errors(made, Recipe.BAYESID, hidden)
         if not len(errors):
-            goals.append(Goal(text, "not run", Verdict.NOT_TESTED, Severity.HIGH))
+            verdicts.append(Verdict.NOT_TESTED)
             continue
         inside, total = int((np.abs(errors) < SIGMAS).sum()), errors.size
-        other = "".join(f"; {name} {_inside(peer)}" for name, peer in _rivals(made, hidden).items())
+        other = "".join(f", {name} {_inside(peer)}" for name, peer in _rivals(made, hidden).items())
         # errors of one study depend on each other: a share is decided by studies, and few cannot decide
-        verdict = Verdict.FAIL if inside < 0.5 * total else Verdict.OPEN
-        told = f"{inside} of {total} in {len(errors)} studies, whose errors are correlated: too few to decide{other}"
-        goals.append(Goal(text, told, verdict, Severity.HIGH))
-    return goals
+        verdicts.append(Verdict.FAIL if inside < 0.5 * total else Verdict.OPEN)
+        told.append(f"{words}: {inside} of {total} in {len(errors)} studies{other}")
+    text = "stated 95 % intervals contain the truth in 95 % of cases, with nothing and with wheel momentum hidden"
+    caution = "; the errors of one study are correlated: too few studies to decide"
+    return Goal(text, "; ".join(told) + caution if told else "not run", Verdict.all_of(verdicts), Severity.HIGH)
 
 
 def _answer(made: Made) -> str:

@@ -74,14 +74,16 @@ def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
     rows = []
     for pair in result.pairs:
-        for where in ("", ", same sizes in random directions"):
+        told: list[str] = []
+        verdicts: list[Verdict] = []
+        for where in ("", "same sizes in random directions: "):
             rows_of = [realised for realised in pair.realised if (realised.direction == "stated") is (not where)]
             shares = {pair.pair.cause(realised.label).name: decided(realised, LAST) for realised in rows_of}
+            verdicts += map(judged, shares.values())
             if shares:
-                text = f"{pair.pair.name.capitalize()}{where}: each identified in {format_percent(SURE)} of flights"
-                reached = "; ".join(f"{name} {share}" for name, share in shares.items())
-                verdict = Verdict.all_of(map(judged, shares.values()))
-                rows.append(Goal(text, reached, verdict, Severity.MEDIUM))
+                told.append(where + ", ".join(f"{name} {share}" for name, share in shares.items()))
+        text = f"{pair.pair.name.capitalize()}: each identified in {format_percent(SURE)} of flights"
+        rows.append(Goal(text, "; ".join(told), Verdict.all_of(verdicts), Severity.MEDIUM))
     far = [pair.deviation(realised, stage) for pair, realised in _rows(result) for stage in analysis.STAGES]
     worst = max(map(abs, far))
     text = f"Realised rates within {AGREE:g} standard errors of the predicted ones"

@@ -154,8 +154,8 @@ def goals_of(result: Result) -> list[Goal]:
     named = [study.body for study in studies if study.diagnosis.verdict.causes]
     better = [study.body for study in studies if study.gain.sum() > 0.0]
     return [
-        *(_quick_fit(body) for body in bodies if body.name in QUICK_FIT),
-        *(_coverage(body) for body in bodies),
+        _quick_fit([body for body in bodies if body.name in QUICK_FIT]),
+        _coverage(list(bodies)),
         _miscounted(result),
         Goal(
             "joint fit: formal over jackknife sd between 0.67 and 1.5 for every moment",
@@ -181,7 +181,7 @@ def goals_of(result: Result) -> list[Goal]:
         ),
         _named(result),
         _moments_no_worse(result),
-        *_reverse(result),
+        _reverse(result),
         Goal(
             "whole run within 10 minutes, without the search for the removed wheel",
             f"{result.seconds / 60.0:.1f} minutes",
@@ -191,12 +191,19 @@ def goals_of(result: Result) -> list[Goal]:
     ]
 
 
-def _quick_fit(body: BodyResult) -> Goal:
-    """Return the goal on the mean size of the differences, which is uncertain by what throws differ."""
-    goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
-    text = f"{body.name}: mean difference of single throws from the stated moments at most {goal:g} %, that of a quick "
-    verdict = Verdict.between(mean - 2.0 * error, mean + 2.0 * error, most=goal)
-    return Goal(f"{text}least-squares fit", f"{mean:.2f} ± {error:.2f} %", verdict, Severity.MEDIUM)
+def _quick_fit(bodies: Sequence[BodyResult]) -> Goal:
+    """Return the goal on the mean sizes of the differences, which are uncertain by what throws differ."""
+    limits = joined(f"{QUICK_FIT[body.name]:g} % ({body.name})" for body in bodies)
+    text = (
+        f"mean difference of single throws from the stated moments at most that of a quick least-squares fit, {limits}"
+    )
+    reached = "; ".join(f"{body.name} {body.mean_error:.2f} ± {body.mean_error_sd:.2f} %" for body in bodies)
+    ends = [
+        (body.mean_error - 2.0 * body.mean_error_sd, body.mean_error + 2.0 * body.mean_error_sd, QUICK_FIT[body.name])
+        for body in bodies
+    ]
+    verdict = Verdict.all_of(Verdict.between(low, high, most=most) for low, high, most in ends)
+    return Goal(text, reached, verdict, Severity.MEDIUM)
 
 
 def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
@@ -206,14 +213,14 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
     return reached, Verdict.of(count == len(result.studies))
 
 
-def _coverage(body: BodyResult) -> Goal:
-    """Return the goal on the intervals of one body, whose truth is uncertain by what its throws share."""
-    count, total = body.covered(0.95)
-    low, high = Share(count, total).interval
+def _coverage(bodies: Sequence[BodyResult]) -> Goal:
+    """Return the goal on the intervals of each body, whose truth is uncertain by what its throws share."""
     percent = f"{100 * LOW:.0f} to {100 * HIGH:.0f} %"
-    text = f"{body.name}: 95 % intervals of single throws contain the stated moments in {percent} of cases"
-    reached = f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
-    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH), Severity.HIGH)
+    text = f"95 % intervals of single throws contain the stated moments in {percent} of cases, on every body"
+    shares = {body.name: Share(*body.covered(0.95)) for body in bodies}
+    reached = "; ".join(f"{name} {share}" for name, share in shares.items())
+    verdict = Verdict.all_of(Verdict.between(*share.interval, LOW, HIGH) for share in shares.values())
+    return Goal(text, reached, verdict, Severity.HIGH)
 
 
 def _miscounted(result: Result) -> Goal:
@@ -280,27 +287,17 @@ def _covered(result: Result) -> str:
     return f"{' of '.join(map(str, covered_in_all(result)))} ({parts})"
 
 
-def _reverse(result: Result) -> list[Goal]:
-    """Goals on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
-    titles = (
-        "recorded wheel removed: a wheel about z has a probability of "
-        f"{DEFAULT_SETTINGS.named_from:g} or more on every body",
-        "recorded wheel removed: the verdict names a wheel on every body",
-    )
+def _reverse(result: Result) -> Goal:
+    """Return the goal on the recorded wheel dropped: that the verdict names it with the probability of a name."""
+    sure = DEFAULT_SETTINGS.named_from
+    text = f"recorded wheel removed: a wheel about z is named, with a probability of {sure:g} or more, on every body"
     if not result.wheels:
-        return [Goal(title, "not run", Verdict.NOT_TESTED, Severity.MEDIUM) for title in titles]
+        return Goal(text, "not run", Verdict.NOT_TESTED, Severity.MEDIUM)
     diagnoses = list(result.wheels.values())
-    probabilities = [wheel_probability(diagnosis) for diagnosis in diagnoses]
+    least = min(map(wheel_probability, diagnoses))
     named = [any(cause.startswith("wheel-history") for cause in diagnosis.verdict.causes) for diagnosis in diagnoses]
-    return [
-        Goal(
-            titles[0],
-            f"smallest probability {format_probability(min(probabilities))}",
-            Verdict.of(min(probabilities) >= DEFAULT_SETTINGS.named_from),
-            Severity.MEDIUM,
-        ),
-        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named)), Severity.MEDIUM),
-    ]
+    reached = f"named on {sum(named)} of {len(named)}; smallest probability {format_probability(least)}"
+    return Goal(text, reached, Verdict.of(all(named) and least >= sure), Severity.MEDIUM)
 
 
 def wheel_probability(diagnosis: Diagnosis) -> float:
