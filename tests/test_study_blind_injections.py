@@ -17,11 +17,11 @@ from studies.blind_injections.goals import (
     _correlation,
     _coverage,
     _least,
+    _misnamed_outside,
     _most,
     _rate,
     _reliable,
     _scatter,
-    _worst_kind,
     goals_of,
     record_of,
     surely_misnamed,
@@ -212,10 +212,12 @@ def test_one_kind_of_outside_effect_must_not_be_misnamed_however_few_others_are(
     aside = replace(stated(None, (), ()), kind="unknown", status="unknown", case="frozen-gyro")
     named = replace(aside, status="explained", causes=("rate-bias",), probability=0.95, case="curved-gyro")
     quiet = replace(named, status="unknown", causes=())
-    assert _worst_kind([]).verdict is Verdict.NOT_TESTED
-    assert _worst_kind([aside] * 90 + [named] + [quiet] * 9).verdict is Verdict.PASS
-    assert _worst_kind([aside] * 90 + [named] * 2 + [quiet] * 8).verdict is Verdict.FAIL
-    assert "worst of 2 kinds: curved-gyro, 2 of 10" in _worst_kind([aside] * 90 + [named] * 2 + [quiet] * 8).reached
+    assert _misnamed_outside([]).verdict is Verdict.NOT_TESTED
+    assert _misnamed_outside([aside] * 990 + [named] + [quiet] * 9).verdict is Verdict.PASS
+    assert _misnamed_outside([aside] * 90 + [named] + [quiet] * 9).verdict is Verdict.OPEN  # 0 to 5.4 % of all
+    twice = _misnamed_outside([aside] * 990 + [named] * 2 + [quiet] * 8)
+    assert twice.verdict is Verdict.FAIL
+    assert twice.reached.endswith("worst of 2 kinds: curved-gyro, 2 of 10")
     assert not surely_misnamed(replace(named, probability=0.89))
     assert not surely_misnamed(replace(named, accept=("rate-bias",)))
 

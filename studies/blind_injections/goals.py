@@ -74,13 +74,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
         _relative(f"Inside, named alone at {CLEAR:g} sigma or more, relative to the simulated limit", 0.97, limited),
         _least(f"Inside, in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
         _remainders(halves),
-        _most(
-            f"Outside: a wrong cause named at {SURE:g} or more",
-            FEW_OUTSIDE,
-            sum(map(surely_misnamed, outside)),
-            len(outside),
-        ),
-        _worst_kind(outside),
+        _misnamed_outside(outside),
         _least(
             f"Outside, reported as unknown or as partly explained at {LEFT:g} sigma or more",
             0.95,
@@ -136,17 +130,24 @@ def _reliable(trials: Sequence[Trial]) -> Goal:
     return Goal(text, f"{'; '.join(parts)}; {least}", verdict, Severity.HIGH)
 
 
-def _worst_kind(trials: Sequence[Trial]) -> Goal:
-    """Return the goal that no kind of outside effect is often named, by the shares that were observed."""
-    text = f"Outside: a wrong cause named at {SURE:g} or more: at most {100.0 * OF_ONE_KIND:g} % of any kind"
-    kinds: dict[str, list[bool]] = {}
+def _misnamed_outside(trials: Sequence[Trial]) -> Goal:
+    """Return the goal that outside effects are seldom named: all by their interval, each kind by its observed share."""
+    goal = _most(f"Outside: a wrong cause named at {SURE:g} or more", FEW_OUTSIDE, *_count(trials))
+    text = f"{goal.text}, and at most {100.0 * OF_ONE_KIND:g} % of any kind"
+    kinds: dict[str, list[Trial]] = {}
     for trial in trials:
-        kinds.setdefault(trial.case, []).append(surely_misnamed(trial))
+        kinds.setdefault(trial.case, []).append(trial)
     if not kinds:
-        return Goal(text, "none", Verdict.NOT_TESTED, Severity.HIGH)
-    name, named = max(kinds.items(), key=lambda item: (sum(item[1]) / len(item[1]), item[0]))
-    verdict = Verdict.of(sum(named) <= OF_ONE_KIND * len(named))
-    return Goal(text, f"worst of {len(kinds)} kinds: {name}, {sum(named)} of {len(named)}", verdict, Severity.HIGH)
+        return replace(goal, text=text)
+    shares = {name: _count(alike) for name, alike in kinds.items()}
+    name, (named, total) = max(shares.items(), key=lambda item: (item[1][0] / item[1][1], item[0]))
+    reached = f"{goal.reached}; worst of {len(kinds)} kinds: {name}, {named} of {total}"
+    return Goal(text, reached, Verdict.all_of([goal.verdict, Verdict.of(named <= OF_ONE_KIND * total)]), Severity.HIGH)
+
+
+def _count(trials: Sequence[Trial]) -> tuple[int, int]:
+    """Return in how many trials a wrong cause is surely named, and of how many."""
+    return sum(map(surely_misnamed, trials)), len(trials)
 
 
 def in_basilisk(trials: Sequence[Trial]) -> list[Trial]:
