@@ -199,7 +199,7 @@ def _caution(summaries: Mapping[str, dict[str, Any]]) -> Iterator[tuple[str, str
     if short:
         yield (
             "Caution",
-            f"Not run in full: {', '.join(short)}. Read {'its' if len(short) == 1 else 'their'} results as examples.",
+            f"Not run in full: {', '.join(short)}. Figures without an interval are examples, not results.",
         )
 
 

@@ -262,6 +262,8 @@ def test_a_verdict_is_shown_with_its_record_inside_and_outside_the_catalogue(mon
     assert explained.startswith("In blind trials of bayesid 0.2.0 and 0.3.0 (95 % intervals in brackets): inside")
     assert "inside the catalogue, 9 of 10 (55 to 100 %) verdicts that explained the data named only" in explained
     assert "outside it, 1 of 6 (0 to 64 %) injections were wrongly explained" in explained
+    partly = record_sentence(Status.PARTLY_EXPLAINED)
+    assert partly.endswith("named only injected causes; outside it, 2 of 3 (9 to 99 %) did.")
     assert "outside it, 2 of 3 (9 to 99 %) listed something unknown" in record_sentence(Status.AMBIGUOUS)
     unknown = record_sentence(Status.UNKNOWN)
     assert "11 of 13 (55 to 98 %) verdicts of an unknown cause followed" in unknown

@@ -91,7 +91,7 @@ def record_sentence(status: Status) -> str | None:
         Status.EXPLAINED: f"inside the catalogue, {here} verdicts that explained the data named only injected causes"
         f"{misnamed}",
         Status.PARTLY_EXPLAINED: f"inside the catalogue, {here} verdicts that explained part of the data named only "
-        f"injected causes{misnamed}",
+        f"injected causes; outside it, {there} did",
         Status.AMBIGUOUS: f"inside the catalogue, {here} ambiguous verdicts listed the injected causes among their "
         f"alternatives; outside it, {there} listed something unknown",
         Status.UNKNOWN: f"{here + there} verdicts of an unknown cause followed an injection outside the catalogue; "

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.files import write_json
-from bayesid._io.words import joined
+from bayesid._io.words import counted, joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, TRUTH, styled, wide_figure
 from bayesid.report.numbers import NO_VALUE, format_number, format_probability
@@ -29,6 +29,7 @@ from studies.common.study import MADE, WORKERS, CsvTable, Picture, Report, Setup
 
 SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
 SHOWN = 2  # trials of a case that were not answered rightly, from which the report lists its answers
+ASTRAY = 10.0  # stated standard deviations from which a parameter of the base is said to be astray
 SUREST = 0.99  # stated probability from which wrong verdicts are counted apart
 TICKS = (3, 5, 7, 10, 20, 50, 100)  # ticks of the signal-to-noise ratio in the figure
 
@@ -70,12 +71,15 @@ def _report(campaign: Campaign) -> Report[Campaign]:
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     whole = sum(trial.named_rightly for trial in sure)
     interval = share_text(right, len(sure)).partition("(")[2].rstrip(")")
+    misnamed = [trial for trial in outside if surely_misnamed(trial)]
+    in_part = sum(trial.remainder == "present" for trial in misnamed)
     answer = (
         f"With a hidden cause of the catalogue, {right} of {len(sure)} verdicts stated at {SURE:g} or more name no "
         f"false cause. The 95 % interval is {interval}; {whole} of them name all hidden causes. In "
-        f"{share_text(sum(map(surely_misnamed, outside)), len(outside))} trials with an effect outside the catalogue a "
-        f"cause of the catalogue was wrongly named with such a probability; {share_text(alarmed, len(nulls))} trials "
-        "with nothing hidden raised an alarm."
+        f"{share_text(len(misnamed), len(outside))} trials with an effect outside the catalogue a cause of the "
+        "catalogue was wrongly named with such a probability"
+        + (f", in {in_part} of them as a part of the misfit next to something unnamed" if misnamed else "")
+        + f"; {share_text(alarmed, len(nulls))} trials with nothing hidden raised an alarm."
     )
     if len(trials) < planned:
         answer += (
@@ -196,6 +200,15 @@ def _failures(document: Document, campaign: Campaign) -> None:
             f"{len(framed) - right - wrongly} not determined. Over all {len(framed)} such torques that were reported "
             f"as unknown, the correlation of the reconstructed with the true one has a median of {median:.2f} and is "
             f"{min(trial.correlation or 0.0 for trial in framed):.2f} in the worst case."
+        )
+    judged = [trial for trial in trials if trial.body_errors and (trial.named_rightly or trial.kind == "adequate")]
+    astray = [trial for trial in judged if np.abs(trial.body_errors).max() > ASTRAY]
+    if astray:
+        others = np.concatenate([trial.body_errors for trial in judged if trial not in astray])
+        texts.append(
+            f"In {counted(len(astray), 'trial')} a parameter of the base is wrong by more than {ASTRAY:g} stated "
+            f"standard deviations: {joined(sorted(map(_hidden, astray)))}. The errors of the base's parameters in all "
+            f"other trials have an rms of {np.sqrt(np.mean(others**2)):.3f} stated standard deviations."
         )
     document.items(texts)
 

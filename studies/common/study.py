@@ -53,7 +53,7 @@ MADE: Mapping[str, Mapping[str, Any]] = {
 
 
 # caution on the first page of a study that was not run in full
-NOT_FULL = "Not run in full: read this report as an example, not as the result."
+NOT_FULL = "Not run in full: figures without an interval are examples, not results."
 
 
 class Verdict(StrEnum):
