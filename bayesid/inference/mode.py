@@ -12,6 +12,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
+from bayesid.inference.balanced_start import balanced_start
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 
@@ -22,7 +23,8 @@ TOLERANCE = 1e-10
 """Relative tolerance of the least-squares solver, far below any standard deviation of the posterior."""
 
 STARTS = 8
-"""Number of random starting points that are tried if the first optimum does not explain the data."""
+"""Number of random starting points that are tried if neither the first optimum nor that from the balance of momentum
+explains the data."""
 
 MOST_EVALUATIONS, MOST_OF_A_START, MOST_AGAIN = 800, 50, 200
 """Largest number of evaluations of the residuals: in a fit, from one of those starting points, and from a mode found.
@@ -98,7 +100,7 @@ def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | Non
     ----------
     posterior : Posterior
     rng : numpy.random.Generator
-        Source of further starting points if the first optimum explains the data badly.
+        Source of further starting points if the first optima explain the data badly.
     start : (n,) array, optional
         Starting point, by default the prior's centre with the measured initial rates.
 
@@ -110,6 +112,10 @@ def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | Non
     first = posterior.starting_point() if start is None else start
     best = fit(posterior, first)
     evaluations = best.evaluations
+    if best.chi2 > SUSPICIOUS * posterior.samples and (balanced := balanced_start(posterior)) is not None:
+        other = fit(posterior, balanced)
+        evaluations += other.evaluations
+        best = min(best, other, key=lambda optimum: optimum.cost)
     if best.chi2 > SUSPICIOUS * posterior.samples:
         for _ in range(STARTS):
             away = 0.5 * rng.normal(size=first.size)

@@ -1,10 +1,10 @@
 """Fit of the present model, with its bodies held where it uses them up for what the model lacks, and along the data.
 
 Where much is lacking, such as a wheel that turns a body by radians, no value of the unknowns follows the data, and the
-fit drives the bodies to where no prior has them: nothing can be linearised there. Such a fit is followed to its end,
-as one that has not converged, since a load of many times its first guess needs more steps than others. If it ends
-astray it is started again from where the bodies have their prior's centre; where it strays from there as well, they
-stay at that centre.
+fit drives the bodies to where no prior has them: nothing can be linearised there. A fit that misses the data is made
+again from the balance of momentum. One that still strays is followed to its end, as one that has not converged, since
+a load of many times its first guess needs more steps than others. If it ends astray it is started again from where the
+bodies have their prior's centre; where it strays from there as well, they stay at that centre.
 
 A fit may also follow the data with unknowns that its prior all but excludes: a body of a thirtieth of its inertia lets
 a small torque do what a wheel does. About such a fit the causes are as good as invisible, so that they are weighed
@@ -32,6 +32,7 @@ from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
+from bayesid.inference.balanced_start import balanced_start
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
@@ -115,6 +116,9 @@ def fit_present_model(
     """
     if not hold:
         first = perturbed.fit(z=z)
+        astray = not first.chi2 <= settings.misfit * first.posterior.samples
+        if z is None and astray and (balanced := balanced_start(perturbed.posterior)) is not None:
+            first = min(first, perturbed.fit(z=balanced), key=lambda fit: fit.cost)
         if strayed(first, settings) or not first.converged:
             first = min(first, _followed(perturbed, perturbed.start() if z is None else z), key=lambda fit: fit.cost)
         if not strayed(first, settings):
