@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
-from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.app.study_to_model import load_manoeuvres, load_model, load_robot
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from tests.conftest import PLANAR
@@ -468,6 +468,14 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     assert Study.load(marked).model_dump() == Study.load(write(tmp_path, text)).model_dump() | {"title": "marked"}
 
 
+def test_the_key_that_names_an_absent_robot_or_link_is_said(tmp_path):
+    with pytest.raises(InputError, match=r"study.toml: robot.urdf: there is no such file: .*robot.urdf"):
+        load_robot(Study.load(write(tmp_path, COMPLETE)))
+    text = f"robot = {{ urdf = '{PLANAR}' }}\nsensors.rate.sigma = 1e-5\nunknowns.bodies = ['bus']"
+    with pytest.raises(InputError, match=r"study.toml: unknowns.bodies: no link or load named 'bus'. Choose one of"):
+        load_robot(Study.load(write(tmp_path, text)))
+
+
 def test_an_absent_and_a_binary_file(tmp_path):
     with pytest.raises(InputError, match=r"absent.toml: there is no such file. Give the path of a study"):
         Study.load(tmp_path / "absent.toml")
@@ -507,7 +515,7 @@ def test_the_place_on_the_orbit_is_required_where_an_effect_depends_on_it(tmp_pa
     with pytest.raises(InputError, match=message) as caught:
         load_manoeuvres(study, Robot.from_urdf(PLANAR))
     asked = message != "there is no such file"
-    assert caught.value.place == ("recordings #2.argument_of_latitude" if asked else None)
+    assert caught.value.place == ("recordings #2.argument_of_latitude" if asked else "recordings #1.file")
 
 
 MISNAMED = {

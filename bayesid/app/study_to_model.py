@@ -104,22 +104,30 @@ def load_robot(study: Study) -> Robot:
 
 def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
     """Return the robot, and the joint prior from an earlier posterior if the study names one."""
+    _refuse_absent(study.robot.urdf, study, "robot.urdf")
     robot = Robot.from_urdf(study.robot.urdf, nearest_physical=study.robot.nearest_physical)
+    place = None
     try:
         for load in study.robot.loads:
             robot = robot.with_load(Load(load.name, load.link, load.parameters))
         for wheel in study.robot.wheels:
             robot = robot.with_wheel(Wheel(wheel.name, wheel.axis, wheel.inertia, wheel.position))
+        place = "unknowns.bodies"
         for name in study.unknowns.bodies:
             robot.link(name)
             if name in study.unknowns.prior:
                 robot = robot.with_inertial(name, study.unknowns.prior[name].parameters)
     except InputError as error:
-        raise InputError(error.problem, file=study.file, place=error.place, remedy=error.remedy) from None
+        raise InputError(error.problem, file=study.file, place=error.place or place, remedy=error.remedy) from None
     carried = _carried(study, robot)
     for name, centre in zip(carried.names, carried.centres, strict=True) if carried else ():
         robot = robot.with_inertial(name, centre)
     return robot, carried
+
+
+def _refuse_absent(file: Path, study: Study, place: str) -> None:
+    if not file.is_file():
+        raise InputError(f"there is no such file: {file}", file=study.file, place=place, remedy="Correct the path")
 
 
 def _carried(study: Study, robot: Robot) -> JointPrior | None:
@@ -267,11 +275,12 @@ def _check_latitudes(study: Study) -> None:
 
 def _load_manoeuvre(study: Study, robot: Robot, section: RecordingSection) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
+    number = study.recordings.index(section) + 1
+    _refuse_absent(section.file, study, f"recordings #{number}.file")
     recording = unwrapped(Recording.read(section.file, recorded_as(study, section, robot)), robot)
     check_wheels(recording, robot.wheels)
     refuse_impossible_joints(recording, robot)  # before they are smoothed; what the base reads is weighed first
     for name in section.start:
-        number = study.recordings.index(section) + 1
         named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)
     blocks = study.telemetry.blocks_per_second
     noise = encoder_noise(study, robot)
