@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -104,6 +105,16 @@ def test_a_base_takes_the_inertia_of_a_body_placed_askew(tmp_path):
     assert robot.link("bus").inertial.mass == 0.0
     again = Robot.from_string(robot.to_urdf())
     np.testing.assert_allclose(mass_matrix(again), mass_matrix(robot), rtol=1e-12, atol=1e-12)
+
+
+def test_a_joint_that_moves_nothing_is_said(tmp_path):
+    """As in SolidWorks exports whose material was forgotten; a frame fixed to a body needs no mass."""
+    tree = ET.fromstring(PLAIN)
+    last = next(link for link in tree.findall("link") if link.get("name") == "link3")
+    last.remove(last.find("inertial"))
+    joints = [joint.get("name") for joint in tree.findall("joint") if joint.find("child").get("link") == "link3"]
+    robot = read(tmp_path, ET.tostring(tree, encoding="unicode"))
+    assert robot.remarks == (f"Joint {joints[0]} moves a body without mass, since no <inertial> is given: link3.",)
 
 
 def test_zero_limits_are_those_that_nobody_entered(tmp_path):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -104,6 +104,7 @@ def prepared_urdf(
     inertials = _physical_inertials(root, file, take_nearest, remarks)
     if inertials[base].mass <= 0.0:
         _take_inertia_of_rigid_body(root, base, inertials, file, remarks)
+    _remark_on_massless_bodies(root, inertials, remarks)
     for link in root.findall("link"):
         write_inertial(link, inertials[link.get("name", "")])
     return inertials, remarks
@@ -359,6 +360,23 @@ def _take_inertia_of_rigid_body(
     problem = "mass > 0 fails: neither the root link nor a link fixed to it has a mass"
     remedy = "The root link is the base body: give it its <inertial>"
     raise InputError(problem, file=file, place=f"link {base}", remedy=remedy)
+
+
+def _remark_on_massless_bodies(
+    root: ET.Element, inertials: Mapping[str, InertialParameters], remarks: list[str]
+) -> None:
+    """Say which joints move a body without mass: all links that are rigidly joined are one body."""
+    fixed = [(parent, child) for joint, parent, child in _joints(root) if joint.get("type") == "fixed"]
+    for joint, _, moved in _joints(root):
+        if joint.get("type") in MOVING:
+            body = [moved]
+            for name in body:
+                body += [child for parent, child in fixed if parent == name]
+            if not any(inertials[name].mass > 0.0 for name in body):
+                links = ", ".join(body)
+                remarks.append(
+                    f"Joint {joint.get('name', '')} moves a body without mass, since no <inertial> is given: {links}."
+                )
 
 
 def write_inertial(link: ET.Element, inertial: InertialParameters) -> None:
