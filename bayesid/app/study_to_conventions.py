@@ -16,6 +16,7 @@ from bayesid.app.study_to_encoders import named_joint
 from bayesid.recording.convention import Convention
 from bayesid.recording.recorded_as import JointRecordedAs, RecordedAs, SensorRecordedAs
 from bayesid.recording.units import ANGLES, TIMES, UNITS
+from bayesid.report.numbers import format_probability
 from bayesid.robot.robot import Robot
 from bayesid.simulation.orbit import EARTH
 
@@ -162,7 +163,10 @@ def _factor(family: str, section: SampledSensor) -> float:
 
 def convention_lines(conventions: Sequence[Convention]) -> list[str]:
     """Return a sentence on each convention, for the terminal."""
-    return [f"{convention.name} (probability {convention.probability:.3g}): {convention}" for convention in conventions]
+    return [
+        f"{convention.name} (probability {format_probability(convention.probability)}): {convention}"
+        for convention in conventions
+    ]
 
 
 def remedy_sentence(file: Path | None) -> str:
