@@ -23,6 +23,7 @@ from bayesid.diagnosis import (
     Frame,
     Hypothesis,
     ProbableVerdict,
+    Remainder,
     SetProbabilities,
     Status,
     candidates,
@@ -184,6 +185,21 @@ def test_every_status_is_said_with_its_gain_and_its_test(biased, clean, status):
     assert f"Of {result.alarm.tests} tests" in alarm
     assert f"that for {result.alarm.loudest} (p " in alarm
     assert ("no alarm is raised" in alarm) is (status is Status.ADEQUATE)
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [
+        (0.02, "An unnamed cause in addition to it is improbable (probability 0.020)."),
+        (0.3, "Whether an unnamed cause acts in addition to it is undecided (probability 0.30)."),
+        (0.98, "A single unnamed cause that resembles it would lead to the same verdict."),
+    ],
+)
+def test_what_remains_beside_the_named_cause_is_said(biased, probability, text):
+    verdict = ProbableVerdict(Status.PARTLY_EXPLAINED, ("accel-bias",), remainder=Remainder.of(probability))
+    said = sentences.verdict_sentence(replace(biased, sensitivity=replace(biased.sensitivity, verdict=verdict)))
+    assert said.startswith("Partly explained by accel-bias. Its probability is more than 0.999.")
+    assert said.endswith(text)
 
 
 def test_the_alternatives_are_said_with_their_probabilities_and_other_names(biased):

@@ -148,7 +148,10 @@ def remainder_sentence(result: Diagnosis) -> str:
             return f"An unnamed cause in addition to {_them(result)} is improbable ({probability})."
         case Rest.UNDECIDED:
             return f"Whether an unnamed cause acts in addition to {_them(result)} is undecided ({probability})."
-    return f"An unnamed cause acts in addition to {_them(result)} ({probability})."
+    return (
+        f"An unnamed cause acts in addition to {_them(result)} ({probability}). A single unnamed cause that resembles "
+        f"{_them(result)} would lead to the same verdict."
+    )
 
 
 def _them(result: Diagnosis) -> str:
