@@ -314,7 +314,7 @@ def pulse_train(draw: Generator, strength: float) -> Options:
 
 
 def thermal_snap(draw: Generator, strength: float) -> Options:
-    """Torque that appears at once and dies away."""
+    """Panel that takes momentum from the base: a torque that appears at once and dies away."""
     start = float(draw.integers(50, 80))
     return _hide(fields=[mj.snap(direction(draw, 2.5e-3 * strength), start=start, decay=4.0)])
 

@@ -221,13 +221,18 @@ def pulses(
 
 
 def snap(torque: ArrayLike, *, start: float, decay: float) -> Field:
-    """Torque, base axes, that appears at a sample time and dies away exponentially within `decay` [s]."""
+    """Reaction of a panel that snaps at a sample time: its torque on the base, base axes, dies away within `decay` [s].
+
+    The panel keeps the angular momentum that it takes from the base, and the base turns it with itself.
+    """
     vector = np.asarray(torque, dtype=float)
 
-    def jerk(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
-        return np.zeros(3), vector * (np.exp((start - time) / decay) if time >= start else 0.0)
+    def react(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
+        left = np.exp((start - time) / decay) if time >= start else 1.0
+        taken = -decay * (1.0 - left) * vector
+        return np.zeros(3), (vector * left if time >= start else np.zeros(3)) - cross(rate, taken)
 
-    return jerk
+    return react
 
 
 def outer_torque(history: Callable[[float], ArrayLike]) -> Field:
