@@ -175,6 +175,15 @@ def test_outside_the_catalogue_it_is_right_to_say_so():
     assert close.holds
 
 
+def test_a_cause_named_by_an_equivalent_that_the_verdict_gives_holds():
+    """The stated probability is that of the class, so that no other member of it makes the verdict wrong."""
+    said = stated(0.99, ("wheel-momentum", "thruster-leak"), ("wheel-momentum", "thruster-pulses"))
+    alone = replace(said, kind="effect", status="explained", sets=(said.causes,))
+    assert not alone.holds
+    assert replace(alone, sets=(said.causes, ("wheel-momentum", "thruster-pulses"))).holds
+    assert not replace(alone, sets=(said.causes, ("wheel-momentum", "thruster-pulses")), status="ambiguous").holds
+
+
 def test_the_plans_hide_everything_and_nothing():
     for full in (False, True):
         plans = plan(full)
@@ -210,8 +219,9 @@ def test_false_names_are_compared_with_what_was_stated_decade_by_decade():
 
 def test_one_kind_of_outside_effect_must_not_be_misnamed_however_few_others_are():
     aside = replace(stated(None, (), ()), kind="unknown", status="unknown", case="frozen-gyro")
-    named = replace(aside, status="explained", causes=("rate-bias",), probability=0.95, case="curved-gyro")
-    quiet = replace(named, status="unknown", causes=())
+    said = {"causes": ("rate-bias",), "sets": (("rate-bias",),)}
+    named = replace(aside, status="explained", probability=0.95, case="curved-gyro", **said)
+    quiet = replace(named, status="unknown", causes=(), sets=())
     assert _misnamed_outside([]).verdict is Verdict.NOT_TESTED
     assert _misnamed_outside([aside] * 990 + [named] + [quiet] * 9).verdict is Verdict.PASS
     assert _misnamed_outside([aside] * 90 + [named] + [quiet] * 9).verdict is Verdict.OPEN  # 0 to 5.4 % of all

@@ -135,8 +135,13 @@ class Trial:
 
     @property
     def holds(self) -> bool:
-        """True if the named causes are all hidden, whatever else is hidden, as their stated probability says."""
-        return bool(self.causes) and set(self.causes) <= set(self.hidden) | set(self.accept)
+        """True if the named causes are all hidden, each by itself or by an equivalent that the verdict gives.
+
+        That is what their stated probability says, whatever else is hidden.
+        """
+        names = set(self.hidden) | set(self.accept)
+        said = self.sets if self.status in EXPLAINING else (self.causes,)
+        return bool(self.causes) and any(set(labels) <= names for labels in said)
 
     @property
     def in_set(self) -> bool:
