@@ -243,6 +243,17 @@ def test_kicks_are_named_where_their_cosines_are_overrated_beside_another_cause(
     assert verdict.causes == ("kicks",)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "seed", "strength", "cause"),
+    [("bias-jump, listed", 300790, 0.488, "rate-bias-jump"), ("thermal-snap, listed", 300119, 0.75, "thermal-snap")],
+)
+def test_events_that_recur_are_not_taken_for_separate_ones(name, seed, strength, cause, tmp_path):
+    """One in each recording has three times the amplitudes; tuned in its place, it lost to a kick or a snap."""
+    case = next(case for case in FURTHER_CASES if case.name == name)
+    assert diagnosed(case.make(tmp_path, seed, strength)).verdict.causes == (cause,)
+
+
 def recurring(draw, strength):
     """One kick, the same at the same time of every recording."""
     start = 0.5 * float(draw.integers(60, 220)) + 0.25

@@ -71,6 +71,9 @@ class ShapeProposal:
     log_others : float
         Logarithm of the mean likelihood of all shapes relative to this one, where Gram space has it: where many do as
         well, as pulses do whose single steps are not seen, the cause has more than its best shape.
+    log_occam : float
+        Logarithm of the factor by which the freedom of the amplitudes lowers the evidence below that of the best
+        amplitudes: one event in each recording has more of it than one that recurs.
     """
 
     effect: Effect
@@ -79,6 +82,7 @@ class ShapeProposal:
     widths: Floats
     log_share: float
     log_others: float = -np.inf
+    log_occam: float = 0.0
 
     @property
     def worth(self) -> float:
@@ -163,7 +167,7 @@ class ShapedCause(CauseKind):
                 proposals = self.proposals(point, effect, causes)
                 tuned += [(log_others + proposal.worth, causes, proposal) for proposal in proposals]
             worth_it = [trial for trial in tuned if trial[2].worth > WORTH and _near(likeliest, trial[0], trial[2])]
-            tuned = _with_exact_gains(point, worth_it)
+            tuned = _with_exact_gains(point, worth_it, bounds[effect.label])
             if not tuned:
                 continue
             names = [manoeuvre.recording.name for manoeuvre in point.fit.posterior.manoeuvres]
@@ -199,11 +203,15 @@ class ShapedCause(CauseKind):
         self, tuned: Sequence[tuple[float, tuple[str, ...], ShapeProposal]]
     ) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
         """Return the most probable proposal, and if wanted that beside nothing."""
-        best = max(tuned, key=lambda trial: trial[0])
+
+        def evidence(trial: tuple[float, tuple[str, ...], ShapeProposal]) -> float:
+            return trial[0] + trial[2].log_occam
+
+        best = max(tuned, key=evidence)
         alone = [trial for trial in tuned if not trial[1]]
         if not self.alone_as_well or not best[1] or not alone:
             return [best]
-        return [best, max(alone, key=lambda trial: trial[0])]
+        return [best, max(alone, key=evidence)]
 
     def with_names(self, effect: Effect, names: Sequence[str]) -> Effect:
         """Return an effect whose amplitudes have the names of their recordings."""
@@ -312,9 +320,11 @@ def _near(likeliest: float, total: float, proposal: ShapeProposal) -> bool:
 
 
 def _with_exact_gains(
-    point: Linearisation, trials: Sequence[tuple[float, tuple[str, ...], ShapeProposal]]
+    point: Linearisation,
+    trials: Sequence[tuple[float, tuple[str, ...], ShapeProposal]],
+    bounds: Sequence[PhysicalBound],
 ) -> list[tuple[float, tuple[str, ...], ShapeProposal]]:
-    """Return proposals with the gains of their own signatures, by which those of different company can be compared.
+    """Return proposals with the gains and evidence of their own signatures, by which they can be compared.
 
     The cosines overrate a shape where its company has taken directions that they resolve badly.
     """
@@ -324,9 +334,16 @@ def _with_exact_gains(
         beside = [(total, proposal) for total, others, proposal in trials if others == causes]
         responses = responses_of(point.perturbed, point.fit, [proposal.effect for _, proposal in beside])
         for (total, proposal), columns in zip(beside, responses, strict=True):
-            gram = left.gram(columns, "trial")
+            items, groups = form_of("trial", proposal.effect, columns, bounds)
+            gram = left.gram(np.concatenate([item.columns for item in items], axis=1), "trial")
             gain = float(half_chi2(gram.matrix, gram.score))
-            exact.append((total + gain - proposal.gain, causes, replace(proposal, gain=gain)))
+            ends = np.cumsum([item.columns.shape[1] for item in items])[:-1]
+            parts = np.split(np.arange(len(gram.score)), ends)
+            of_units = replace(gram, groups={item.name: part for item, part in zip(items, parts, strict=True)})
+            evidence = SetEvidence(of_units, [CandidateCause("trial", groups)])
+            log_occam = evidence.log_evidence(("trial",)) - gain
+            with_gain = replace(proposal, gain=gain, log_occam=log_occam)
+            exact.append((total + gain - proposal.gain, causes, with_gain))
     return exact
 
 
