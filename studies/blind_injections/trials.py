@@ -39,7 +39,7 @@ WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)  # least and largest strength o
 
 # seed of the first trial of the small and of the full plan; those of tests, of development and of earlier campaigns are
 # others
-FIRST_SEED = {False: 200, True: 300_000}
+FIRST_SEED = {False: 200, True: 400_000}
 
 # numbers of trials of the full plan with a cause of the catalogue, with one outside it and with nothing hidden, and how
 # many of these fly in Basilisk

@@ -68,6 +68,12 @@ def g_sensitive_gyro(draw: Generator, strength: float) -> Options:
     return _by_axes("rate", lambda truth: truth.accel @ matrix.T)
 
 
+def warming_gyro(draw: Generator, strength: float) -> Options:
+    """Rate sensor whose scale factors change in proportion to time as it warms up."""
+    factor = direction(draw, 0.02 * strength)
+    return _by_axes("rate", lambda truth: factor * truth.rate * (truth.times / truth.times[-1])[:, None])
+
+
 def curved_accelerometer(draw: Generator, strength: float) -> Options:
     """Accelerometer that errs by a multiple of the acceleration's square along each axis [s2/m]."""
     curvature = direction(draw, 3.0 * strength)
@@ -115,6 +121,16 @@ def eccentric_encoder(joint: str, draw: Generator, strength: float) -> Options:
     return {"distort": distort}
 
 
+def rippled_encoder(joint: str, draw: Generator, strength: float) -> Options:
+    """Hide an encoder that errs twelve times per turn, by the ripple of its gear or of its interpolation."""
+    size, phase, name = 3e-4 * strength, float(draw.uniform(0.0, 2.0 * np.pi)), f"position.{joint}"
+
+    def distort(table: Table, truth: Truth) -> None:
+        table[name] = table[name] + size * np.sin(12.0 * table[name] + phase)
+
+    return {"distort": distort}
+
+
 def swinging_mass(draw: Generator, strength: float) -> Options:
     """Mass that a pump or a mechanism moves to and fro within the base, along a line, at a frequency of its own."""
     body = mj.Body(3.0, direction(draw, 0.4), 0.01 * np.eye(3))
@@ -143,6 +159,17 @@ def quadratic_drag(draw: Generator, strength: float) -> Options:
     """Torque against the rate, in proportion to its square."""
     factor = 20.0 * strength * draw.uniform(0.5, 1.0, 3)
     return {"hidden": mj.Hidden(fields=[lambda time, attitude, rate: (np.zeros(3), -factor * np.abs(rate) * rate)])}
+
+
+def coupled_drag(draw: Generator, strength: float) -> Options:
+    """Torque against the rate, in proportion to its magnitude times a matrix: the axes brake each other."""
+    matrix = np.diag(draw.uniform(0.5, 1.0, 3)) + 0.3 * draw.uniform(-1.0, 1.0, (3, 3))
+    size = 20.0 * strength
+
+    def brake(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
+        return np.zeros(3), -size * float(np.linalg.norm(rate)) * matrix @ rate
+
+    return {"hidden": mj.Hidden(fields=[brake])}
 
 
 def aligning_torque(draw: Generator, strength: float) -> Options:
@@ -244,6 +271,9 @@ FURTHER_CASES: tuple[Case | WheelCase, ...] = (
     _outside("creeping-mass", creeping_mass, urdf=SERVICER4),
     _outside("quadratic-drag", quadratic_drag, frame="base"),
     _outside("aligning-torque", aligning_torque, urdf=SERVICER4, frame="orbit"),
+    _outside("warming-gyro", warming_gyro),
+    _outside("rippled-encoder", partial(rippled_encoder, "joint2"), urdf=SERVICER4),
+    _outside("coupled-drag", coupled_drag, frame="base"),
 )
 
 NOW_LISTED = ("pulse-train", "thermal-snap", "shifting-mass", "bias-jump", "backlash")
