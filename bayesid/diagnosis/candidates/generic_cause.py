@@ -11,6 +11,7 @@ from bayesid.diagnosis.candidates.axis_sizes import with_axis_sizes
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
 from bayesid.diagnosis.candidates.imitations import with_imitations
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank, Signatures
+from bayesid.diagnosis.candidates.motion_errors import motion_columns, motion_signatures
 from bayesid.diagnosis.candidates.tones import with_tones
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
@@ -121,14 +122,17 @@ def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     - disturbing torque and force: smooth courses in base axes, whose cosines have variances that fall beyond a corner,
       or on both sides of a band where it swings; the force acts through the centre of mass;
     - pulse of torque: at one instant of one recording, about any axis;
-    - error of each sensor: smooth courses of its channels.
+    - error of each sensor: smooth courses of its channels;
+    - errors and torques that follow the motion instead of time (`bayesid.diagnosis.candidates.motion_errors`).
     """
     posterior = perturbed.posterior
     kinds = posterior.model.channels.kinds
+    torque, _ = _largest(posterior)
     banks = [
         smooth_signatures(perturbed, fit),
-        _pulses(perturbed, fit, _largest(posterior)[0]),
+        _pulses(perturbed, fit, torque),
         *(error_signatures(posterior, f"error of {kind.value}", posterior.model.channels.of(kind)) for kind in kinds),
+        motion_signatures(perturbed, fit, ERROR, torque),
     ]
     return SignatureBank.joined(banks)
 
@@ -164,9 +168,8 @@ def generic_columns(posterior: Posterior) -> int:
     recordings, kinds = len(posterior.manoeuvres), posterior.model.channels.kinds
     courses = sum(len(chosen) * count for _, chosen, count in course_groups("", recordings, WAVES))
     wrenches = 6 if any(kind.feels_force for kind in kinds) else 3
-    return courses * (wrenches + posterior.model.channels.count) + 3 * recordings * instants_of_each(
-        INSTANTS, recordings
-    )
+    pulses = 3 * recordings * instants_of_each(INSTANTS, recordings)
+    return courses * (wrenches + posterior.model.channels.count) + pulses + motion_columns(posterior)
 
 
 def _largest(posterior: Posterior) -> tuple[float, float]:

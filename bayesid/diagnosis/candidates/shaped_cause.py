@@ -334,13 +334,12 @@ def _with_exact_gains(
         beside = [(total, proposal) for total, others, proposal in trials if others == causes]
         responses = responses_of(point.perturbed, point.fit, [proposal.effect for _, proposal in beside])
         for (total, proposal), columns in zip(beside, responses, strict=True):
-            items, groups = form_of("trial", proposal.effect, columns, bounds)
-            gram = left.gram(np.concatenate([item.columns for item in items], axis=1), "trial")
+            of_units, groups = form_of("trial", proposal.effect, columns, bounds)
+            gram = left.gram(np.concatenate([part.columns for part in of_units], axis=1), "trial")
             gain = float(half_chi2(gram.matrix, gram.score))
-            ends = np.cumsum([item.columns.shape[1] for item in items])[:-1]
-            parts = np.split(np.arange(len(gram.score)), ends)
-            of_units = replace(gram, groups={item.name: part for item, part in zip(items, parts, strict=True)})
-            evidence = SetEvidence(of_units, [CandidateCause("trial", groups)])
+            places = np.split(np.arange(len(gram.score)), np.cumsum([part.columns.shape[1] for part in of_units])[:-1])
+            split = replace(gram, groups=dict(zip((part.name for part in of_units), places, strict=True)))
+            evidence = SetEvidence(split, [CandidateCause("trial", groups)])
             log_occam = evidence.log_evidence(("trial",)) - gain
             with_gain = replace(proposal, gain=gain, log_occam=log_occam)
             exact.append((total + gain - proposal.gain, causes, with_gain))
