@@ -29,6 +29,7 @@ from bayesid.diagnosis import (
     candidates,
     diagnose,
 )
+from bayesid.diagnosis.candidates.motion_errors import JOINT
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.noise import UnderstatedNoise
 from bayesid.diagnosis.noise.noise_fault import FittedFault
@@ -245,6 +246,13 @@ def test_what_is_unknown_is_said_with_the_most_probable_generic_candidate(biased
     said = sentences.verdict_sentence(result)
     assert f"(probability {format_probability(result.probabilities.unknown)})" in said
     assert said.endswith("the most probable is: error of accel.")
+
+
+def test_what_follows_the_motion_is_said_with_its_joint(biased):
+    point = biased.search.searches[0].point
+    said = sentences.verdict_sentence(weighed(judged(biased, Status.UNKNOWN), ((), JOINT, 9.0)))
+    assert said.endswith(f"the most probable is: {point.most_probable_form(JOINT, (JOINT,)).name}.")
+    assert said.removesuffix(".").endswith(tuple(joint.name for joint in point.fit.posterior.model.robot.joints))
 
 
 def test_what_is_unresolved_is_said_with_the_most_probable_sets(biased):

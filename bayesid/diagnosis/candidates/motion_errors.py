@@ -31,7 +31,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.arm_motion_effects import LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE
 
-__all__ = ["JOINT", "RATE_TORQUE", "Series", "motion_columns", "motion_signatures"]
+__all__ = ["JOINT", "RATE_TORQUE", "SENSOR", "Series", "motion_columns", "motion_signatures"]
 
 JOINT, SENSOR, RATE_TORQUE = "position-dependent error of a joint", "motion-dependent error of", "rate-dependent torque"
 """Names of the candidates; that of a sensor follows."""

@@ -49,8 +49,9 @@ GLOSSARY = (
     ("class", "Causes whose effects these data cannot distinguish; one probability applies to all of them."),
     (
         "something unknown",
-        "Any of the candidates that represent causes outside the catalogue: a smooth torque, force or sensor error, a "
-        "pulse of torque, a burst of a sensor, or a residual that a fit with named causes does not explain.",
+        "Any of the candidates that represent causes outside the catalogue: a smooth torque, force or sensor error, an "
+        "error or torque that depends on the motion, a pulse of torque, a burst of a sensor, or a residual that a fit "
+        "with named causes does not explain.",
     ),
     (
         "p, adjusted",

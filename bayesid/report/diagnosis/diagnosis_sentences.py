@@ -16,6 +16,7 @@ from bayesid.diagnosis import (
     TorquesNotRead,
 )
 from bayesid.diagnosis.candidates.cause_kind import cause_kinds
+from bayesid.diagnosis.candidates.motion_errors import JOINT, SENSOR
 from bayesid.diagnosis.evidence.verdict import UNKNOWN
 from bayesid.diagnosis.noise import noise_faults
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of, instants_of
@@ -136,8 +137,16 @@ def verdict_sentence(result: Diagnosis) -> str:
     return (
         "Unknown: the anomaly most probably has a cause that is not in the catalogue "
         f"({probability_text(result.probabilities.unknown)}). Among the candidates outside the catalogue, the most "
-        f"probable is: {generic}."
+        f"probable is: {_named_in_full(result, generic)}."
     )
+
+
+def _named_in_full(result: Diagnosis, generic: str) -> str:
+    """Return the name of a candidate outside the catalogue, of one that follows the motion with joint or readings."""
+    point = result.search.searches[0].point
+    if not generic.startswith((JOINT, SENSOR)) or generic not in point.evidence.causes:
+        return generic
+    return point.most_probable_form(generic, (generic,)).name
 
 
 def remainder_sentence(result: Diagnosis) -> str:
