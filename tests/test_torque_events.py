@@ -16,7 +16,10 @@ from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
-from studies.truth import hidden_causes
+from studies.truth import mujoco as mj
+from studies.truth.bodies import SERVICER4
+from studies.truth.hidden_causes import causes as hide
+from studies.truth.hidden_causes.catalogue import hidden_case
 
 TIME = np.linspace(0.0, 100.0, 201)
 SHAPES = np.array([(k / 20, decay) for decay in (0.05, np.inf) for k in range(20)])
@@ -78,9 +81,19 @@ def test_what_is_held_is_not_found_again():
     assert 6 in found.chosen(Taken.nothing(matrix.shape[1])).places
 
 
+def torque_at_once(draw, strength):
+    """Torque from outside, base axes, that appears at once and dies away."""
+    start, vector = float(draw.integers(50, 80)), hide.direction(draw, 2.5e-3 * strength)
+
+    def torque(time, attitude, rate):
+        return np.zeros(3), vector * (np.exp((start - time) / 4.0) if time >= start else 0.0)
+
+    return {"hidden": mj.Hidden(fields=[torque])}
+
+
 @pytest.mark.usefixtures("slow")
-def test_a_snap_in_mujoco_is_drawn_better_with_events(tmp_path):
-    case = next(case for case in hidden_causes.CASES if case.name == "thermal-snap")
+def test_a_sudden_torque_in_mujoco_is_drawn_better_with_events(tmp_path):
+    case = hidden_case("sudden torque", torque_at_once, urdf=SERVICER4, status="unknown", frame="base")
     written = case.write(tmp_path / "study", 5, 1.5)
     study = Study.load(written.file)
     model = load_model(study)
