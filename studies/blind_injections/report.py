@@ -78,7 +78,7 @@ def _report(campaign: Campaign) -> Report[Campaign]:
         f"false cause. The 95 % interval is {interval}; {whole} of them name all hidden causes. In "
         f"{share_text(len(misnamed), len(outside))} trials with an effect outside the catalogue a cause of the "
         "catalogue was wrongly named with such a probability"
-        + (f", in {in_part} of them as a part of the misfit next to something unnamed" if misnamed else "")
+        + (f", in {in_part} of them as a part of the misfit next to something unnamed" if in_part else "")
         + f"; {share_text(alarmed, len(nulls))} trials with nothing hidden raised an alarm."
     )
     if len(trials) < planned:
