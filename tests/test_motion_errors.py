@@ -8,8 +8,10 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.candidates import motion_errors
 from bayesid.diagnosis.candidates.motion_errors import HARMONIC, JOINT, RATE_TORQUE, Series, motion_signatures
+from bayesid.diagnosis.outcome.joint_error import JointError
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
+from bayesid.report import figures
 from studies.truth import hidden_causes
 from studies.truth.hidden_causes.further import FURTHER_CASES
 
@@ -80,6 +82,15 @@ def test_a_series_holds_the_harmonics_of_a_turn():
             np.testing.assert_allclose(columns @ amplitudes, true, atol=0.1 * HARMONIC**order)
 
 
+def test_the_error_of_a_joint_is_drawn_over_its_position():
+    positions = np.linspace(-0.5, 1.0, 20)
+    error = JointError("joint2", "rad", positions, 2e-3 * np.sin(2.0 * positions), np.full(20, 1e-4))
+    (axes,) = figures.joint_error_curve(error).axes
+    assert axes.get_xlabel() == "recorded position of joint2 [rad]"
+    assert axes.get_ylabel() == "error [$10^{-3}$ rad]"
+    np.testing.assert_allclose(axes.lines[-1].get_ydata(), 2.0 * np.sin(2.0 * positions))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed", "strength", "candidate"),
@@ -96,3 +107,12 @@ def test_what_follows_the_motion_is_unknown_and_not_misnamed(name, seed, strengt
     result = diagnose(model, load_manoeuvres(study, model.robot), seed)
     assert result.verdict.status is Status.UNKNOWN
     assert result.probabilities.inclusion[candidate] > 0.9
+    if candidate != JOINT:
+        assert result.joint_error is None
+        return
+    phase = np.random.default_rng([seed, 2]).uniform(0.0, 2.0 * np.pi)
+    error = result.joint_error
+    true = 2e-3 * strength * np.sin(2.0 * error.positions + phase)
+    assert error.joint == "joint2"
+    assert (np.abs(error.errors - true) < 4.0 * error.deviations).all()
+    assert error.deviations.max() < 0.2 * np.abs(true).max()

@@ -12,6 +12,7 @@ from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.design.design_result import Design
 from bayesid.diagnosis.candidates.generic_cause import FEW
+from bayesid.diagnosis.candidates.motion_errors import JOINT
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Remainder, Status, VerdictSensitivity
@@ -29,6 +30,7 @@ from bayesid.diagnosis.outcome.gain import (
     strongest_recording,
 )
 from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_pairs
+from bayesid.diagnosis.outcome.joint_error import JointError, joint_error
 from bayesid.diagnosis.outcome.motion_change import MotionChange, motion_change
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
@@ -252,6 +254,12 @@ class Diagnosis(ShortForm):
     def torque_correlations(self) -> list[TorqueCorrelation]:
         """Largest correlations of the torque of `disturbance` with motion, orbit and clock."""
         return torque_correlations(self.disturbance, self.before)
+
+    @property
+    def joint_error(self) -> JointError | None:
+        """Error of a joint's recorded position by the position, if that is most probably what is unnamed."""
+        probability = self.probabilities.inclusion.get(JOINT, 0.0)
+        return joint_error(self.search.searches[0].point) if probability > self.settings.unknown_from else None
 
     @cached_property
     def posterior(self) -> Posterior:

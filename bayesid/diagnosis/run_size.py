@@ -12,6 +12,7 @@ from bayesid.diagnosis.candidates.event_cause import EventCause
 from bayesid.diagnosis.candidates.generic_cause import generic_columns, instants_of_each
 from bayesid.diagnosis.candidates.instant_cause import INSTANTS, InstantCause
 from bayesid.diagnosis.candidates.linear_cause import group_names
+from bayesid.diagnosis.candidates.motion_errors import motion_columns
 from bayesid.diagnosis.candidates.shaped_cause import ShapedCause
 from bayesid.diagnosis.candidates.vibration_cause import FREQUENCIES, PAIRS, slosh_entries
 from bayesid.inference.memory_estimate import FEWER
@@ -78,7 +79,7 @@ class RunSize:
             Candidates.
         """
         recordings = len(posterior.manoeuvres)
-        shared, local = dict[str, int](), generic_columns(posterior)
+        shared, local = {"motion": motion_columns(posterior)}, generic_columns(posterior)
         for effect in effects:
             amplitudes = len(effect.amplitude_quantities)
             if effect.modes_count:

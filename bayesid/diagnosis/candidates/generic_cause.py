@@ -11,7 +11,7 @@ from bayesid.diagnosis.candidates.axis_sizes import with_axis_sizes
 from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
 from bayesid.diagnosis.candidates.imitations import with_imitations
 from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank, Signatures
-from bayesid.diagnosis.candidates.motion_errors import motion_columns, motion_signatures
+from bayesid.diagnosis.candidates.motion_errors import motion_signatures
 from bayesid.diagnosis.candidates.tones import with_tones
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
@@ -159,7 +159,7 @@ def smooth_signatures(perturbed: PerturbedModel, fit: Fit, recordings: Sequence[
 
 
 def generic_columns(posterior: Posterior) -> int:
-    """Return the number of columns of `generic_signatures`.
+    """Return the number of columns of `generic_signatures` that change one recording each.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def generic_columns(posterior: Posterior) -> int:
     courses = sum(len(chosen) * count for _, chosen, count in course_groups("", recordings, WAVES))
     wrenches = 6 if any(kind.feels_force for kind in kinds) else 3
     pulses = 3 * recordings * instants_of_each(INSTANTS, recordings)
-    return courses * (wrenches + posterior.model.channels.count) + pulses + motion_columns(posterior)
+    return courses * (wrenches + posterior.model.channels.count) + pulses
 
 
 def _largest(posterior: Posterior) -> tuple[float, float]:

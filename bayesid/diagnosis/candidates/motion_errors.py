@@ -31,7 +31,16 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.arm_motion_effects import LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE
 
-__all__ = ["JOINT", "RATE_TORQUE", "SENSOR", "Series", "motion_columns", "motion_signatures"]
+__all__ = [
+    "JOINT",
+    "RATE_TORQUE",
+    "SENSOR",
+    "Series",
+    "joint_positions",
+    "joint_series",
+    "motion_columns",
+    "motion_signatures",
+]
 
 JOINT, SENSOR, RATE_TORQUE = "position-dependent error of a joint", "motion-dependent error of", "rate-dependent torque"
 """Names of the candidates; that of a sensor follows."""
@@ -113,17 +122,15 @@ def motion_columns(posterior: Posterior) -> int:
 
 def _joints(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     """Return the bank of an error of one joint's recorded position [rad or m]; joints that hardly move have none."""
-    robot, motions = perturbed.posterior.model.robot, [flown.motion for flown in perturbed.posterior.manoeuvres]
-    sides = [np.asarray(side.environment.time) for side in (fit.operating.node, fit.operating.sample)]
-    states = [[motion.evaluate(time) for motion, time in zip(motions, side, strict=True)] for side in sides]
-    positions = np.concatenate([state.position for side in states for state in side])
+    robot, states = perturbed.posterior.model.robot, _states(fit)
+    positions = joint_positions(fit)
     moving = np.flatnonzero(np.ptp(positions, axis=0) > MOVES)
     if not len(moving):
         return SignatureBank()
     tables = [[_sensitivity(robot, state) for state in side] for side in states]
     forms = []
     for index in map(int, moving):
-        series = Series.over(positions[:, index], HARMONIC)
+        series = joint_series(positions[:, index])
         rows = [
             np.stack(
                 [
@@ -139,6 +146,33 @@ def _joints(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
         columns = _responses(perturbed, fit, node_rows=rows[0], sample_rows=rows[1])
         forms.append((Signatures(f"{JOINT}, {joint.name}", columns), largest))
     return _bank(JOINT, forms)
+
+
+def _states(fit: Fit) -> list[list[JointState]]:
+    """Return the recorded motion at nodes and samples, of each recording."""
+    motions = [flown.motion for flown in fit.posterior.manoeuvres]
+    sides = [np.asarray(side.environment.time) for side in (fit.operating.node, fit.operating.sample)]
+    return [[motion.evaluate(time) for motion, time in zip(motions, side, strict=True)] for side in sides]
+
+
+def joint_positions(fit: Fit) -> Floats:
+    """Return the recorded positions of all joints at all nodes and samples, (n, joints).
+
+    Parameters
+    ----------
+    fit : Fit
+    """
+    return np.concatenate([state.position for side in _states(fit) for state in side])
+
+
+def joint_series(visited: Floats) -> Series:
+    """Return the series of a joint's error, given the positions that it takes.
+
+    Parameters
+    ----------
+    visited : (n,) array
+    """
+    return Series.over(visited, HARMONIC)
 
 
 def _sensitivity(robot: Robot, state: JointState) -> Floats:

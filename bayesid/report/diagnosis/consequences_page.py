@@ -52,6 +52,12 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
             "axis covers the two fits: a wider prior is a line over the whole width. A shift beyond the bars is an "
             "error that the stated standard deviations do not cover.",
         )
+    if (error := result.joint_error) is not None:
+        document.figure(
+            figures.joint_error_curve(error),
+            f"Recorded less true position of {error.joint} by the position, if the unnamed cause is an error of its "
+            "encoder; the band is ± 1 standard deviation.",
+        )
     _add_disturbance(document, result)
 
 

@@ -14,6 +14,7 @@ from bayesid.report.figures.design_figures import (
 )
 from bayesid.report.figures.diagnosis_figures import (
     candidate_strengths,
+    joint_error_curve,
     parameter_forest,
     plot_disturbance,
     plot_verdict,
@@ -48,6 +49,7 @@ __all__ = [
     "direction_widths",
     "displacements",
     "final_positions",
+    "joint_error_curve",
     "joints_within_limits",
     "loop_progress",
     "manoeuvre",

@@ -12,6 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Diagnosis, DisturbingWrench, Frame
 from bayesid.diagnosis.outcome.cause_sizes import Z95
 from bayesid.diagnosis.outcome.gain import ParameterChange
+from bayesid.diagnosis.outcome.joint_error import JointError
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report.figures.figure_style import (
@@ -38,6 +39,7 @@ from bayesid.simulation.sensors import SensorKind
 __all__ = [
     "GIVEN",
     "candidate_strengths",
+    "joint_error_curve",
     "moved_axis",
     "parameter_forest",
     "plot_disturbance",
@@ -222,6 +224,21 @@ def wrench_spectrum(wrench: DisturbingWrench) -> Figure:
         axes.locator_params(axis="both", nbins=4)
     panels[0, 0].set_ylabel("amplitude")
     shared_legend(figure, panels[0, 0], columns=4)
+    return figure
+
+
+@styled
+def joint_error_curve(error: JointError) -> Figure:
+    """Draw the error of a joint's recorded position by the position, with a band of one standard deviation."""
+    figure = wide_figure(1.9)
+    axes = figure.subplots()
+    scale, prefix = decimal_scale(error.errors)
+    middle, half = error.errors / scale, error.deviations / scale
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    axes.fill_between(error.positions, middle - half, middle + half, color=AFTER, alpha=0.25, linewidth=0.0)
+    axes.plot(error.positions, middle, color=AFTER)
+    axes.set_xlabel(f"recorded position of {error.joint} [{error.unit}]")
+    axes.set_ylabel(f"error [{prefix}{error.unit}]")
     return figure
 
 
